@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace roslam {
+
+/// A pinhole camera with Brown-Conrady lens distortion. Pixels: x right, y down, the centre of the top left
+/// pixel at (0, 0). Camera frame: z forward, x right, y down, metres.
+struct Camera {
+  int width = 640;                                   ///< pixels
+  int height = 480;                                  ///< pixels
+  double fx = 525.0;                                 ///< pixels
+  double fy = 525.0;                                 ///< pixels
+  double cx = 319.5;                                 ///< pixels
+  double cy = 239.5;                                 ///< pixels
+  std::array<double, 5> distortion{0, 0, 0, 0, 0};   ///< k1, k2, p1, p2, k3
+  double depth_units_per_metre = 5000.0;             ///< value of a 16-bit depth image at one metre
+  double fps = 30.0;                                 ///< frames a second
+
+  /// Throws CalibrationError naming the field that no real camera can have.
+  void validate() const;
+
+  bool has_distortion() const;
+
+  /// Pinhole projection of a point in the camera frame (z > 0) to an undistorted pixel.
+  Eigen::Vector2d project(const Eigen::Vector3d& point) const {
+    return {fx * point.x() / point.z() + cx, fy * point.y() / point.z() + cy};
+  }
+
+  /// The point in the camera frame seen at an undistorted pixel with depth z (metres along the optical axis).
+  Eigen::Vector3d unproject(const Eigen::Vector2d& pixel, double z) const {
+    return {(pixel.x() - cx) / fx * z, (pixel.y() - cy) / fy * z, z};
+  }
+
+  /// Where an undistorted pixel lies in the image as taken.
+  Eigen::Vector2d distort(const Eigen::Vector2d& pixel) const;
+
+  /// Where a pixel of the image as taken would lie without lens distortion (inverse of distort).
+  Eigen::Vector2d undistort(const Eigen::Vector2d& pixel) const;
+
+  /// The box that holds every undistorted pixel of the image: {min_x, min_y, max_x, max_y}.
+  std::array<double, 4> undistorted_bounds() const;
+
+  bool operator==(const Camera&) const = default;
+};
+
+/// The names load_camera knows: tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated.
+std::vector<std::string> camera_preset_names();
+
+/// The preset of that name, or nothing.
+std::optional<Camera> camera_preset(std::string_view name);
+
+/// Reads a camera file (YAML: model, width, height, fx, fy, cx, cy, distortion, depth_units_per_metre, fps).
+/// Throws InputError for a missing or malformed file or an unknown key, CalibrationError for absurd values.
+Camera read_camera(const std::filesystem::path& file);
+
+/// A preset name or a camera file. Throws as read_camera does.
+Camera load_camera(const std::string& preset_or_file);
+
+/// Writes what read_camera reads.
+std::string camera_to_yaml(const Camera& camera);
+
+}  // namespace roslam

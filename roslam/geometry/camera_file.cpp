@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <yaml-cpp/yaml.h>
+
+#include <map>
+#include <set>
+
+#include "roslam/error.hpp"
+#include "roslam/geometry/camera.hpp"
+
+namespace roslam {
+
+namespace {
+std::map<std::string, Camera, std::less<>> presets() {
+  const auto make = [](double fx, double fy, double cx, double cy, std::array<double, 5> distortion, double units) {
+    return Camera{640, 480, fx, fy, cx, cy, distortion, units, 30.0};
+  };
+  // TUM: calibration published with the RGB-D benchmark. RealSense: typical factory values of the colour
+  // stream at 640x480 with depth aligned to colour; calibrate your own camera for the best accuracy.
+  return {
+      {"tum-fr1", make(517.3, 516.5, 318.6, 255.3, {0.2624, -0.9531, -0.0054, 0.0026, 1.1633}, 5000)},
+      {"tum-fr2", make(520.9, 521.0, 325.1, 249.7, {0.2312, -0.7849, -0.0033, -0.0001, 0.9172}, 5000)},
+      {"tum-fr3", make(535.4, 539.2, 320.1, 247.6, {}, 5000)},
+      {"7scenes", make(525.0, 525.0, 320.0, 240.0, {}, 1000)},
+      {"d435", make(615.0, 615.0, 320.0, 240.0, {}, 1000)},
+      {"d455", make(385.0, 385.0, 320.0, 240.0, {}, 1000)},
+      {"simulated", make(385.0, 385.0, 319.5, 239.5, {}, 1000)},
+  };
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string all;
+  for (const auto& name : names) all += (all.empty() ? "" : " ") + name;
+  return all;
+}
+
+class CameraFile {
+ public:
+  CameraFile(const std::filesystem::path& path, const YAML::Node& node) : path_(path), node_(node) {}
+
+  template <typename T>
+  T get(const std::string& key) const {
+    if (!node_[key]) throw InputError(path_.string() + ": camera file has no '" + key + "'; add it");
+    try {
+      return node_[key].as<T>();
+    } catch (const YAML::Exception&) {
+      throw InputError(path_.string() + ": '" + key + "' has a value of the wrong type");
+    }
+  }
+
+  template <typename T>
+  T get(const std::string& key, T otherwise) const {
+    return node_[key] ? get<T>(key) : otherwise;
+  }
+
+ private:
+  std::filesystem::path path_;
+  YAML::Node node_;
+};
+
+void reject_unknown_keys(const std::filesystem::path& path, const YAML::Node& node) {
+  const std::set<std::string> known{"model", "width", "height",     "fx",
+                                    "fy",    "cx",    "cy",         "distortion",
+                                    "fps",   "depth_units_per_metre"};
+  for (const auto& entry : node) {
+    const auto key = entry.first.as<std::string>();
+    if (!known.contains(key)) {
+      throw InputError(path.string() + ": unknown key '" + key + "'; known: model width height fx fy cx cy " +
+                       "distortion depth_units_per_metre fps");
+    }
+  }
+}
+}  // namespace
+
+std::vector<std::string> camera_preset_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, camera] : presets()) names.push_back(name);
+  return names;
+}
+
+std::optional<Camera> camera_preset(std::string_view name) {
+  const auto all = presets();
+  const auto found = all.find(name);
+  return found == all.end() ? std::nullopt : std::make_optional(found->second);
+}
+
+Camera read_camera(const std::filesystem::path& file) {
+  YAML::Node node;
+  try {
+    node = YAML::LoadFile(file.string());
+  } catch (const YAML::BadFile&) {
+    throw InputError(file.string() + ": cannot open the camera file; give a YAML file or a preset (" +
+                     joined(camera_preset_names()) + ")");
+  } catch (const YAML::Exception& error) {
+    throw InputError(file.string() + ": not a valid YAML file: " + error.what());
+  }
+  if (!node.IsMap()) throw InputError(file.string() + ": a camera file holds 'key: value' lines");
+  reject_unknown_keys(file, node);
+  const CameraFile read(file, node);
+  if (const auto model = read.get<std::string>("model", "pinhole"); model != "pinhole") {
+    throw InputError(file.string() + ": camera model '" + model + "' is not supported; use pinhole");
+  }
+  Camera camera;
+  camera.width = read.get<int>("width");
+  camera.height = read.get<int>("height");
+  camera.fx = read.get<double>("fx");
+  camera.fy = read.get<double>("fy");
+  camera.cx = read.get<double>("cx");
+  camera.cy = read.get<double>("cy");
+  const auto coefficients = read.get<std::vector<double>>("distortion", {});
+  if (coefficients.size() > 5) throw InputError(file.string() + ": distortion has more than 5 values k1 k2 p1 p2 k3");
+  std::copy(coefficients.begin(), coefficients.end(), camera.distortion.begin());
+  camera.depth_units_per_metre = read.get<double>("depth_units_per_metre", camera.depth_units_per_metre);
+  camera.fps = read.get<double>("fps", camera.fps);
+  try {
+    camera.validate();
+  } catch (const CalibrationError& error) {
+    throw CalibrationError(file.string() + ": " + error.what());
+  }
+  return camera;
+}
+
+Camera load_camera(const std::string& preset_or_file) {
+  if (const auto preset = camera_preset(preset_or_file)) return *preset;
+  return read_camera(preset_or_file);
+}
+
+std::string camera_to_yaml(const Camera& camera) {
+  YAML::Emitter out;
+  out.SetDoublePrecision(12);
+  out << YAML::BeginMap;
+  out << YAML::Key << "model" << YAML::Value << "pinhole";
+  out << YAML::Key << "width" << YAML::Value << camera.width;
+  out << YAML::Key << "height" << YAML::Value << camera.height;
+  out << YAML::Key << "fx" << YAML::Value << camera.fx;
+  out << YAML::Key << "fy" << YAML::Value << camera.fy;
+  out << YAML::Key << "cx" << YAML::Value << camera.cx;
+  out << YAML::Key << "cy" << YAML::Value << camera.cy;
+  out << YAML::Key << "distortion" << YAML::Value << YAML::Flow
+      << std::vector<double>(camera.distortion.begin(), camera.distortion.end());
+  out << YAML::Key << "depth_units_per_metre" << YAML::Value << camera.depth_units_per_metre;
+  out << YAML::Key << "fps" << YAML::Value << camera.fps << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+}  // namespace roslam
