@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace roslam::app {
+
+// Each adds one subcommand to the program; its callback does the work and throws roslam::Error on bad input.
+void add_simulate_command(CLI::App& program);
+void add_evaluate_command(CLI::App& program);
+
+}  // namespace roslam::app

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/commands.hpp"
+
+namespace roslam::app {
+
+void add_simulate_command(CLI::App&) {}
+
+}  // namespace roslam::app
