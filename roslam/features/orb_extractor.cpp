@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/features/orb_extractor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "roslam/error.hpp"
+
+namespace roslam {
+
+namespace {
+constexpr int kPatchRadius = 15;  // pixels of a level: the patch ORB describes is 31 wide
+constexpr int kBorder = 19;       // pixels of a level left out, so that the rotated patch stays inside
+constexpr int kFastRadius = 3;    // pixels of a level FAST looks around a corner
+
+void require(bool condition, const char* message) {
+  if (!condition) throw OptionsError(std::string("orb.") + message);
+}
+
+// Serves the cells of a grid in turns, strongest point first, until enough points are chosen.
+std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint>& points, const cv::Size& size, int wanted) {
+  if (static_cast<int>(points.size()) <= wanted) return points;
+  const double side = std::sqrt(static_cast<double>(size.area()) / wanted);
+  const int columns = std::max(1, static_cast<int>(std::ceil(size.width / side)));
+  const auto cell_of = [&](const cv::KeyPoint& p) {
+    return static_cast<int>(p.pt.y / side) * columns + static_cast<int>(p.pt.x / side);
+  };
+  for (auto& point : points) point.class_id = cell_of(point);
+  std::sort(points.begin(), points.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+    if (a.class_id != b.class_id) return a.class_id < b.class_id;
+    if (a.response != b.response) return a.response > b.response;
+    return a.pt.y != b.pt.y ? a.pt.y < b.pt.y : a.pt.x < b.pt.x;
+  });
+  // The turn in which a point is served is its rank within its cell.
+  int rank = 0;
+  for (std::size_t i = 0, previous_cell = points.size(); i < points.size(); ++i) {
+    const auto cell = static_cast<std::size_t>(points[i].class_id);
+    rank = i > 0 && cell == previous_cell ? rank + 1 : 0;
+    previous_cell = cell;
+    points[i].octave = rank;
+  }
+  std::nth_element(points.begin(), points.begin() + wanted, points.end(),
+                   [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+                     if (a.octave != b.octave) return a.octave < b.octave;
+                     if (a.response != b.response) return a.response > b.response;
+                     return a.class_id < b.class_id;
+                   });
+  points.resize(static_cast<std::size_t>(wanted));
+  return points;
+}
+
+// Direction from the centre of a round patch to its intensity centroid, in degrees (Rublee et al. 2011, eq. 3).
+float orientation(const cv::Mat& image, const cv::Point& centre, const std::vector<int>& circle) {
+  int moment_x = 0;
+  int moment_y = 0;
+  const auto* row = image.ptr<uchar>(centre.y) + centre.x;
+  for (int x = -kPatchRadius; x <= kPatchRadius; ++x) moment_x += x * row[x];
+  for (int y = 1; y <= kPatchRadius; ++y) {
+    const auto* below = image.ptr<uchar>(centre.y + y) + centre.x;
+    const auto* above = image.ptr<uchar>(centre.y - y) + centre.x;
+    const int half_width = circle[static_cast<std::size_t>(y)];
+    int difference = 0;
+    for (int x = -half_width; x <= half_width; ++x) {
+      moment_x += x * (below[x] + above[x]);
+      difference += below[x] - above[x];
+    }
+    moment_y += y * difference;
+  }
+  return cv::fastAtan2(static_cast<float>(moment_y), static_cast<float>(moment_x));
+}
+}  // namespace
+
+void OrbOptions::validate() const {
+  require(features >= 50 && features <= 20000, "features must be 50 to 20000");
+  require(levels >= 1 && levels <= 16, "levels must be 1 to 16");
+  require(scale_factor > 1.0 && scale_factor <= 2.0, "scale_factor must be above 1 and at most 2");
+  require(fast_threshold >= 1 && fast_threshold <= 255, "fast_threshold must be 1 to 255");
+  require(min_fast_threshold >= 1 && min_fast_threshold <= fast_threshold,
+          "min_fast_threshold must be 1 to fast_threshold");
+  require(cell_size >= 16, "cell_size must be at least 16 pixels");
+  require(mask_margin >= 0 && mask_margin <= 100, "mask_margin must be 0 to 100 pixels");
+}
+
+OrbExtractor::OrbExtractor(const OrbOptions& options) : options_(options) {
+  options_.validate();
+  double total = 0.0;
+  for (int level = 0; level < options_.levels; ++level) {
+    scales_.push_back(static_cast<float>(std::pow(options_.scale_factor, level)));
+    total += 1.0 / scales_.back();
+  }
+  for (const float scale : scales_) {
+    quotas_.push_back(static_cast<int>(std::lround(options_.features / (total * scale))));
+  }
+  for (int y = 0; y <= kPatchRadius; ++y) {
+    circle_.push_back(static_cast<int>(std::sqrt(kPatchRadius * kPatchRadius - y * y + 0.5)));
+  }
+  describer_ = cv::ORB::create(options_.features, static_cast<float>(options_.scale_factor), options_.levels, kBorder,
+                               0, 2, cv::ORB::FAST_SCORE, 2 * kPatchRadius + 1, options_.fast_threshold);
+}
+
+std::vector<cv::KeyPoint> OrbExtractor::corners(const cv::Mat& level_image) const {
+  std::vector<cv::KeyPoint> found;
+  std::vector<cv::KeyPoint> in_cell;
+  const int width = level_image.cols - 2 * kBorder;
+  const int height = level_image.rows - 2 * kBorder;
+  if (width < 1 || height < 1) return found;
+  const int columns = std::max(1, width / options_.cell_size);
+  const int rows = std::max(1, height / options_.cell_size);
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < columns; ++c) {
+      const cv::Point begin(kBorder + width * c / columns - kFastRadius, kBorder + height * r / rows - kFastRadius);
+      const cv::Point end(kBorder + width * (c + 1) / columns + kFastRadius,
+                          kBorder + height * (r + 1) / rows + kFastRadius);
+      const cv::Mat cell = level_image(cv::Rect(begin, end));
+      cv::FAST(cell, in_cell, options_.fast_threshold, true);
+      if (in_cell.empty()) cv::FAST(cell, in_cell, options_.min_fast_threshold, true);
+      for (auto& corner : in_cell) {
+        corner.pt += cv::Point2f(begin);
+        found.push_back(corner);
+      }
+    }
+  }
+  return found;
+}
+
+std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyramid, const cv::Mat& mask) const {
+  std::vector<cv::KeyPoint> all;
+  int surplus = 0;  // what coarser or finer levels could not fill is passed on
+  for (std::size_t level = 0; level < pyramid.size(); ++level) {
+    const float scale = scales_[level];
+    auto points = corners(pyramid[level]);
+    if (!mask.empty()) {
+      std::erase_if(points, [&](const cv::KeyPoint& p) {
+        const int x = std::min(static_cast<int>(std::lround(p.pt.x * scale)), mask.cols - 1);
+        const int y = std::min(static_cast<int>(std::lround(p.pt.y * scale)), mask.rows - 1);
+        return mask.at<uchar>(y, x) != 0;
+      });
+    }
+    const int wanted = quotas_[level] + surplus;
+    points = spread(points, pyramid[level].size(), wanted);
+    surplus = wanted - static_cast<int>(points.size());
+    for (auto& point : points) {
+      point.angle = orientation(pyramid[level], point.pt, circle_);
+      point.octave = static_cast<int>(level);
+      point.size = static_cast<float>(2 * kPatchRadius + 1) * scale;
+      point.pt *= scale;
+      all.push_back(point);
+    }
+  }
+  return all;
+}
+
+std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat& mask) const {
+  if (grey.empty() || grey.type() != CV_8UC1) throw InputError("ORB extraction needs an 8-bit grey image");
+  if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
+    throw InputError("the mask of ORB extraction must be an 8-bit image of the size of the picture");
+  }
+  cv::Mat forbidden;
+  if (!mask.empty()) {
+    const int side = 2 * options_.mask_margin + 1;
+    cv::dilate(mask, forbidden, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
+  }
+  std::vector<cv::Mat> pyramid{grey};
+  for (std::size_t level = 1; level < scales_.size(); ++level) {
+    const cv::Size size(cvRound(static_cast<float>(grey.cols) / scales_[level]),
+                        cvRound(static_cast<float>(grey.rows) / scales_[level]));
+    cv::Mat smaller;
+    cv::resize(pyramid.back(), smaller, size, 0, 0, cv::INTER_LINEAR);
+    pyramid.push_back(smaller);
+  }
+  std::vector<cv::KeyPoint> points = detect(pyramid, forbidden);
+  cv::Mat descriptors;
+  if (!points.empty()) describer_->compute(grey, points, descriptors);
+  std::vector<OrbFeature> features(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    features[i].pixel = points[i].pt;
+    features[i].level = points[i].octave;
+    features[i].angle = points[i].angle;
+    std::memcpy(features[i].descriptor.data(), descriptors.ptr(static_cast<int>(i)), sizeof(Descriptor));
+  }
+  return features;
+}
+
+}  // namespace roslam

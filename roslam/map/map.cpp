@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/map/map.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace roslam {
+
+namespace {
+// A landmark is still recognised a little nearer and farther than the pyramid alone would allow.
+constexpr float kNearTolerance = 0.8F;
+constexpr float kFarTolerance = 1.2F;
+}  // namespace
+
+KeyframeId Map::add_keyframe(std::size_t frame_index, double timestamp, const SE3& T_camera_world,
+                             std::shared_ptr<const ObservedFrame> view) {
+  const KeyframeId id{static_cast<std::uint32_t>(keyframes_.size())};
+  const std::size_t points = view->size();
+  keyframes_.push_back(std::make_unique<Keyframe>(
+      Keyframe{id, frame_index, timestamp, T_camera_world, std::move(view), std::vector<LandmarkId>(points)}));
+  anchors_.emplace_back();
+  ++keyframe_count_;
+  return id;
+}
+
+LandmarkId Map::add_landmark(const Eigen::Vector3d& position, KeyframeId keyframe, std::uint32_t point) {
+  const LandmarkId id{static_cast<std::uint32_t>(landmarks_.size())};
+  auto landmark = std::make_unique<Landmark>();
+  landmark->id = id;
+  landmark->position = position;
+  landmark->created_by = keyframe;
+  landmark->predicted = 1;
+  landmark->found = 1;
+  landmark->colour = find(keyframe)->view->colours[point];
+  landmarks_.push_back(std::move(landmark));
+  merged_into_.emplace_back();
+  ++landmark_count_;
+  add_observation(id, keyframe, point);
+  refresh(id);
+  return id;
+}
+
+bool Map::add_observation(LandmarkId landmark_id, KeyframeId keyframe_id, std::uint32_t point) {
+  Landmark* landmark = find(landmark_id);
+  Keyframe* keyframe = find(keyframe_id);
+  if (landmark == nullptr || keyframe == nullptr || keyframe->landmarks[point].is_valid()) return false;
+  auto& observations = landmark->observations;
+  const auto at = std::lower_bound(observations.begin(), observations.end(), keyframe_id,
+                                   [](const Observation& o, KeyframeId id) { return o.keyframe < id; });
+  if (at != observations.end() && at->keyframe == keyframe_id) return false;
+  observations.insert(at, {keyframe_id, point});
+  keyframe->landmarks[point] = landmark_id;
+  return true;
+}
+
+void Map::remove_observation(LandmarkId landmark_id, KeyframeId keyframe_id) {
+  Landmark* landmark = find(landmark_id);
+  if (landmark == nullptr) return;
+  auto& observations = landmark->observations;
+  const auto at = std::find_if(observations.begin(), observations.end(),
+                               [&](const Observation& o) { return o.keyframe == keyframe_id; });
+  if (at == observations.end()) return;
+  if (Keyframe* keyframe = find(keyframe_id)) keyframe->landmarks[at->point] = LandmarkId{};
+  observations.erase(at);
+  if (observations.empty()) remove_landmark(landmark_id);
+}
+
+void Map::remove_landmark(LandmarkId id) {
+  const Landmark* landmark = find(id);
+  if (landmark == nullptr) return;
+  for (const auto& observation : landmark->observations) {
+    find(observation.keyframe)->landmarks[observation.point] = LandmarkId{};
+  }
+  landmarks_[id.index()].reset();
+  --landmark_count_;
+}
+
+void Map::remove_keyframe(KeyframeId id, KeyframeId anchor) {
+  Keyframe* keyframe = find(id);
+  const Keyframe* holder = find(anchor);
+  if (keyframe == nullptr || holder == nullptr) return;
+  anchors_[id.index()] = {anchor, keyframe->T_camera_world * holder->T_camera_world.inverse()};
+  const std::vector<LandmarkId> seen = keyframe->landmarks;
+  for (const LandmarkId landmark : seen) {
+    if (landmark.is_valid()) remove_observation(landmark, id);
+  }
+  keyframes_[id.index()].reset();
+  --keyframe_count_;
+}
+
+void Map::merge_landmarks(LandmarkId from, LandmarkId into) {
+  Landmark* source = find(from);
+  Landmark* target = find(into);
+  if (source == nullptr || target == nullptr || from == into) return;
+  const std::vector<Observation> observations = source->observations;
+  target->found += source->found;
+  target->predicted += source->predicted;
+  remove_landmark(from);
+  merged_into_[from.index()] = into;
+  for (const auto& observation : observations) add_observation(into, observation.keyframe, observation.point);
+  refresh(into);
+}
+
+Keyframe* Map::find(KeyframeId id) {
+  return id.index() < keyframes_.size() ? keyframes_[id.index()].get() : nullptr;
+}
+
+const Keyframe* Map::find(KeyframeId id) const {
+  return id.index() < keyframes_.size() ? keyframes_[id.index()].get() : nullptr;
+}
+
+Landmark* Map::find(LandmarkId id) {
+  return id.index() < landmarks_.size() ? landmarks_[id.index()].get() : nullptr;
+}
+
+const Landmark* Map::find(LandmarkId id) const {
+  return id.index() < landmarks_.size() ? landmarks_[id.index()].get() : nullptr;
+}
+
+LandmarkId Map::resolve(LandmarkId id) const {
+  while (id.is_valid() && merged_into_[id.index()].is_valid()) id = merged_into_[id.index()];
+  return id;
+}
+
+SE3 Map::T_camera_world(KeyframeId id) const {
+  SE3 T_camera_anchor;
+  while (find(id) == nullptr) {
+    T_camera_anchor = T_camera_anchor * anchors_[id.index()].T_camera_anchor;
+    id = anchors_[id.index()].keyframe;
+  }
+  return T_camera_anchor * find(id)->T_camera_world;
+}
+
+void Map::refresh(LandmarkId id) {
+  Landmark* landmark = find(id);
+  if (landmark == nullptr) return;
+  std::vector<Descriptor> descriptors;
+  for (const auto& observation : landmark->observations) {
+    descriptors.push_back(find(observation.keyframe)->view->descriptors[observation.point]);
+  }
+  landmark->descriptor = descriptors[most_typical(descriptors)];
+  refresh_geometry(id);
+}
+
+void Map::refresh_geometry(LandmarkId id) {
+  Landmark* landmark = find(id);
+  if (landmark == nullptr) return;
+  landmark->normal.setZero();
+  for (const auto& observation : landmark->observations) {
+    const SE3 T_world_camera = find(observation.keyframe)->T_camera_world.inverse();
+    landmark->normal += (T_world_camera.translation() - landmark->position).normalized();
+  }
+  landmark->normal.normalize();
+  // The first observation tells at which distance the patch has the size of its level.
+  const auto& first = landmark->observations.front();
+  const Keyframe& keyframe = *find(first.keyframe);
+  const double distance = (keyframe.T_camera_world * landmark->position).norm();
+  const int level = keyframe.view->levels[first.point];
+  landmark->max_distance = static_cast<float>(distance) * scale(level);
+  landmark->min_distance = landmark->max_distance / scales_.back() * kNearTolerance;
+  landmark->max_distance *= kFarTolerance;
+}
+
+int Map::predict_level(const Landmark& landmark, double distance) const {
+  const double ratio = landmark.max_distance / kFarTolerance / distance;
+  const double step = scales_.size() > 1 ? std::log(scales_[1] / scales_[0]) : 1.0;
+  const int level = static_cast<int>(std::ceil(std::log(ratio) / step));
+  return std::clamp(level, 0, static_cast<int>(scales_.size()) - 1);
+}
+
+std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId id, int min_shared) const {
+  const Keyframe* keyframe = find(id);
+  std::vector<int> shared(keyframes_.size(), 0);
+  if (keyframe != nullptr) {
+    for (const LandmarkId landmark_id : keyframe->landmarks) {
+      if (!landmark_id.is_valid()) continue;
+      for (const auto& observation : find(landmark_id)->observations) ++shared[observation.keyframe.index()];
+    }
+    shared[id.index()] = 0;
+  }
+  std::vector<std::pair<KeyframeId, int>> result;
+  for (std::uint32_t i = 0; i < shared.size(); ++i) {
+    if (shared[i] >= std::max(1, min_shared)) result.emplace_back(KeyframeId{i}, shared[i]);
+  }
+  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  return result;
+}
+
+std::vector<KeyframeId> Map::keyframe_ids() const {
+  std::vector<KeyframeId> ids;
+  for (const auto& keyframe : keyframes_) {
+    if (keyframe) ids.push_back(keyframe->id);
+  }
+  return ids;
+}
+
+std::vector<LandmarkId> Map::landmark_ids() const {
+  std::vector<LandmarkId> ids;
+  for (const auto& landmark : landmarks_) {
+    if (landmark) ids.push_back(landmark->id);
+  }
+  return ids;
+}
+
+}  // namespace roslam

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/map/map_ply.hpp"
+
+#include <bit>
+#include <cstring>
+#include <fstream>
+
+#include "roslam/error.hpp"
+
+namespace roslam {
+
+void write_map_ply(const std::filesystem::path& file, const Map& map) {
+  static_assert(std::endian::native == std::endian::little, "the PLY header promises little-endian values");
+  std::ofstream out(file, std::ios::binary);
+  const auto ids = map.landmark_ids();
+  out << "ply\nformat binary_little_endian 1.0\ncomment RO-SLAM sparse map, world frame, metres\n"
+      << "element vertex " << ids.size() << "\n"
+      << "property float x\nproperty float y\nproperty float z\n"
+      << "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+  for (const LandmarkId id : ids) {
+    const Landmark& landmark = *map.find(id);
+    const Eigen::Vector3f position = landmark.position.cast<float>();
+    char record[15];
+    std::memcpy(record, position.data(), 12);
+    for (int c = 0; c < 3; ++c) record[12 + c] = static_cast<char>(landmark.colour[2 - c]);
+    out.write(record, sizeof(record));
+  }
+  out.flush();
+  if (!out) throw OutputError(file.string() + ": cannot write the map; is the folder writable and the disk not full?");
+}
+
+}  // namespace roslam

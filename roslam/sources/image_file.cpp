@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/sources/image_file.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
+#include <string_view>
+#include <vector>
+
+namespace roslam {
+
+namespace {
+// Decoders fill up the missing part of a cut-off file and report success, so look for the end mark ourselves.
+bool is_complete(const std::vector<char>& bytes) {
+  const std::string_view view(bytes.data(), bytes.size());
+  const std::string_view tail = view.substr(view.size() - std::min<std::size_t>(view.size(), 64));
+  if (view.starts_with("\x89PNG")) return tail.find("IEND") != std::string_view::npos;
+  if (view.starts_with("\xff\xd8")) return tail.find("\xff\xd9") != std::string_view::npos;
+  return true;
+}
+
+ImageFile read_image(const std::filesystem::path& file, int flags) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return {{}, "is missing"};
+  const std::vector<char> bytes{std::istreambuf_iterator<char>(in), {}};
+  if (bytes.empty() || !is_complete(bytes)) return {{}, "is truncated"};
+  cv::Mat image;
+  try {
+    image = cv::imdecode(bytes, flags);
+  } catch (const cv::Exception&) {
+    image.release();
+  }
+  if (image.empty()) return {{}, "cannot be decoded"};
+  return {image, {}};
+}
+}  // namespace
+
+ImageFile read_colour_image(const std::filesystem::path& file) { return read_image(file, cv::IMREAD_COLOR); }
+
+ImageFile read_depth_image(const std::filesystem::path& file) {
+  ImageFile read = read_image(file, cv::IMREAD_UNCHANGED);
+  if (read.error.empty() && read.image.type() != CV_16UC1) return {{}, "is not a 16-bit grey image"};
+  return read;
+}
+
+cv::Mat depth_to_metres(const cv::Mat& raw, double units_per_metre) {
+  cv::Mat metres;
+  raw.convertTo(metres, CV_32FC1, 1.0 / units_per_metre);
+  return metres;
+}
+
+}  // namespace roslam

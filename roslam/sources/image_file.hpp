@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+
+namespace roslam {
+
+/// An image read from a file, or why it could not be read.
+struct ImageFile {
+  cv::Mat image;      ///< empty on failure
+  std::string error;  ///< "is missing", "is truncated", "cannot be decoded"; empty on success
+};
+
+/// Reads a PNG or JPEG as CV_8UC3 (BGR). Half-written files are refused, not filled up with grey.
+ImageFile read_colour_image(const std::filesystem::path& file);
+
+/// Reads a 16-bit single-channel image as CV_16UC1.
+ImageFile read_depth_image(const std::filesystem::path& file);
+
+/// Raw depth units to CV_32FC1 metres; 0 stays 0 (unknown).
+cv::Mat depth_to_metres(const cv::Mat& raw, double units_per_metre);
+
+}  // namespace roslam

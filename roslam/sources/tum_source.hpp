@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "roslam/sources/frame_source.hpp"
+
+namespace roslam {
+
+struct TumOptions {
+  double max_time_difference = 0.02;  ///< seconds between a colour image and the depth image paired with it
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+};
+
+/// One line of rgb.txt or depth.txt.
+struct TimedFile {
+  double timestamp = 0.0;      ///< seconds
+  std::filesystem::path file;  ///< relative to the dataset folder
+};
+
+/// Pairs each colour image with the depth image nearest in time; each depth image serves once. The result holds an
+/// index into depth or -1, one for each colour image. Both lists must be sorted by time.
+std::vector<int> associate(const std::vector<TimedFile>& colour, const std::vector<TimedFile>& depth,
+                           double max_time_difference);
+
+/// A folder in the TUM RGB-D format: rgb.txt, depth.txt and the images they name (PNG or JPEG; depth 16-bit).
+/// A colour image without a depth image near in time is given with an empty depth; images that are missing,
+/// truncated, of the wrong size or out of the order of time are skipped and counted.
+class TumSource : public FrameSource {
+ public:
+  /// Throws InputError if the folder or a list is missing, malformed or names no image, CalibrationError if the
+  /// camera is absurd.
+  TumSource(const std::filesystem::path& folder, const Camera& camera, const TumOptions& options = {});
+
+  std::optional<Frame> next() override;
+  const Camera& camera() const override { return camera_; }
+  std::optional<std::size_t> size() const override { return colour_.size(); }
+  std::map<std::string, std::size_t> skipped() const override { return skipped_; }
+
+  /// True if the folder looks like a TUM dataset.
+  static bool recognises(const std::filesystem::path& folder);
+
+ private:
+  std::optional<Frame> read(std::size_t index);
+  cv::Mat read_depth_for(std::size_t index, const cv::Size& colour_size);
+
+  std::filesystem::path folder_;
+  Camera camera_;
+  std::vector<TimedFile> colour_;
+  std::vector<TimedFile> depth_;
+  std::vector<int> depth_of_colour_;
+  std::map<std::string, std::size_t> skipped_;
+  std::size_t position_ = 0;
+};
+
+}  // namespace roslam
