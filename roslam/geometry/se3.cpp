@@ -7,18 +7,6 @@ namespace roslam {
 
 namespace {
 constexpr double kSmallAngle = 1e-8;
-
-// Left Jacobian of SO(3): how a tangent translation turns into a translation under exp.
-Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& omega) {
-  const double theta = omega.norm();
-  const Eigen::Matrix3d w = skew(omega);
-  if (theta < 1e-5) {
-    return Eigen::Matrix3d::Identity() + 0.5 * w + w * w / 6.0;
-  }
-  const double t2 = theta * theta;
-  return Eigen::Matrix3d::Identity() + (1.0 - std::cos(theta)) / t2 * w +
-         (theta - std::sin(theta)) / (t2 * theta) * w * w;
-}
 }  // namespace
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
@@ -45,15 +33,25 @@ Eigen::Vector3d so3_log(const Eigen::Quaterniond& q) {
   return scale * v;
 }
 
+Eigen::Matrix3d so3_left_jacobian(const Eigen::Vector3d& omega) {
+  const double theta = omega.norm();
+  const Eigen::Matrix3d w = skew(omega);
+  if (theta < 1e-5) {
+    return Eigen::Matrix3d::Identity() + 0.5 * w + w * w / 6.0;
+  }
+  const double t2 = theta * theta;
+  return Eigen::Matrix3d::Identity() + (1.0 - std::cos(theta)) / t2 * w +
+         (theta - std::sin(theta)) / (t2 * theta) * w * w;
+}
 SE3 SE3::exp(const Vector6d& tangent) {
   const Eigen::Vector3d omega = tangent.tail<3>();
-  return {so3_exp(omega), left_jacobian(omega) * tangent.head<3>()};
+  return {so3_exp(omega), so3_left_jacobian(omega) * tangent.head<3>()};
 }
 
 Vector6d SE3::log() const {
   const Eigen::Vector3d omega = so3_log(rotation_);
   Vector6d tangent;
-  tangent.head<3>() = left_jacobian(omega).inverse() * translation_;
+  tangent.head<3>() = so3_left_jacobian(omega).inverse() * translation_;
   tangent.tail<3>() = omega;
   return tangent;
 }

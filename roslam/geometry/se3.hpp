@@ -16,6 +16,9 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& v);
 Eigen::Quaterniond so3_exp(const Eigen::Vector3d& omega);
 Eigen::Vector3d so3_log(const Eigen::Quaterniond& q);
 
+/// Left Jacobian J of SO(3): exp(omega + d) = exp(J d) exp(omega) to first order (Barfoot 2017, eq. 7.77).
+Eigen::Matrix3d so3_left_jacobian(const Eigen::Vector3d& omega);
+
 /// A rigid motion. A variable named T_a_b maps coordinates in frame b to coordinates in frame a.
 class SE3 {
  public:

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/pipeline/options.hpp"
+
+#include "roslam/error.hpp"
+
+namespace roslam {
+
+void ThreadOptions::validate() const {
+  if (frame_queue < 1 || frame_queue > 1000) throw OptionsError("threads.frame_queue must be 1 to 1000");
+  if (keyframe_queue < 1 || keyframe_queue > 1000) throw OptionsError("threads.keyframe_queue must be 1 to 1000");
+}
+
+void Options::validate() const {
+  orb.validate();
+  depth.validate();
+  noise.validate();
+  matcher.validate();
+  pose.validate();
+  local_map.validate();
+  relocaliser.validate();
+  tracker.validate();
+  keyframes.validate();
+  landmarks.validate();
+  fusion.validate();
+  culling.validate();
+  bundle.validate();
+  threads.validate();
+}
+
+Tracker::Settings Options::tracker_settings() const {
+  return {tracker, matcher, pose, local_map, relocaliser, noise};
+}
+
+LocalMapper::Settings Options::mapper_settings() const {
+  return {landmarks, fusion, culling, bundle, matcher, noise};
+}
+
+}  // namespace roslam

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <yaml-cpp/yaml.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "roslam/error.hpp"
+#include "roslam/pipeline/options_fields.hpp"
+
+namespace roslam {
+
+namespace {
+using Keys = std::map<std::string, std::set<std::string>>;
+
+Keys known_keys() {
+  Keys keys;
+  const Options options;
+  for_each_option(options, [&](const char* section, const char* key, const auto&) { keys[section].insert(key); });
+  return keys;
+}
+
+std::string joined(const auto& names, const auto& name_of) {
+  std::string all;
+  for (const auto& entry : names) all += (all.empty() ? "" : " ") + std::string(name_of(entry));
+  return all;
+}
+
+void reject_unknown_keys(const std::filesystem::path& file, const YAML::Node& root) {
+  const Keys known = known_keys();
+  for (const auto& section : root) {
+    const auto name = section.first.as<std::string>();
+    const auto found = known.find(name);
+    if (found == known.end()) {
+      throw OptionsError(file.string() + ": unknown section '" + name + "'; known: " +
+                         joined(known, [](const auto& entry) { return entry.first; }));
+    }
+    if (section.second.IsNull()) continue;
+    if (!section.second.IsMap()) throw OptionsError(file.string() + ": '" + name + "' must hold 'key: value' lines");
+    for (const auto& entry : section.second) {
+      const auto key = entry.first.as<std::string>();
+      if (!found->second.contains(key)) {
+        throw OptionsError(file.string() + ": unknown key '" + name + "." + key + "'; known: " +
+                           joined(found->second, [](const auto& k) { return k; }));
+      }
+    }
+  }
+}
+}  // namespace
+
+Options read_options(const std::filesystem::path& file) {
+  YAML::Node root;
+  try {
+    root = YAML::LoadFile(file.string());
+  } catch (const YAML::BadFile&) {
+    throw InputError(file.string() + ": cannot open the configuration file; roslam run --print-config shows one");
+  } catch (const YAML::Exception& error) {
+    throw InputError(file.string() + ": not a valid YAML file: " + error.what());
+  }
+  Options options;
+  if (root.IsNull()) return options;
+  if (!root.IsMap()) throw InputError(file.string() + ": a configuration file holds sections of 'key: value' lines");
+  reject_unknown_keys(file, root);
+  const YAML::Node& readable = root;  // so that asking for an absent section does not create it
+  for_each_option(options, [&](const char* section, const char* key, auto& field) {
+    if (!readable[section] || !readable[section].IsMap() || !readable[section][key]) return;
+    try {
+      field = readable[section][key].template as<std::decay_t<decltype(field)>>();
+    } catch (const YAML::Exception&) {
+      throw OptionsError(file.string() + ": '" + section + "." + key + "' has a value of the wrong type");
+    }
+  });
+  try {
+    options.validate();
+  } catch (const OptionsError& error) {
+    throw OptionsError(file.string() + ": " + error.what());
+  }
+  return options;
+}
+
+std::string options_to_yaml(const Options& options) {
+  YAML::Emitter out;
+  out.SetDoublePrecision(12);
+  std::string open;
+  out << YAML::BeginMap;
+  for_each_option(options, [&](const char* section, const char* key, const auto& field) {
+    if (open != section) {
+      if (!open.empty()) out << YAML::EndMap;
+      out << YAML::Key << section << YAML::Value << YAML::BeginMap;
+      open = section;
+    }
+    out << YAML::Key << key << YAML::Value << field;
+  });
+  out << YAML::EndMap << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+std::string options_to_json(const Options& options) {
+  nlohmann::ordered_json json;
+  for_each_option(options, [&](const char* section, const char* key, const auto& field) {
+    json[section][key] = field;
+  });
+  return json.dump();
+}
+
+}  // namespace roslam

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <stop_token>
+
+#include "roslam/pipeline/slam.hpp"
+#include "roslam/sources/frame_source.hpp"
+
+namespace roslam {
+
+struct RunSummary {
+  std::size_t dropped = 0;            ///< frames the tracker was too busy for (real-time mode)
+  bool interrupted = false;           ///< stopped before the source ended
+  double wall_seconds = 0.0;          ///< from the first read to the last result
+  double first_pose_seconds = -1.0;   ///< from the first read to the first pose; negative = no pose
+};
+
+/// Feeds a source through the pipeline until it ends or a stop is requested; the frame in work is finished first.
+/// In real-time mode frames come at the pace of their timestamps on a thread of their own, and what the tracker has
+/// no time for is dropped. on_frame is called on the calling thread after each frame. Throws what the source throws.
+RunSummary run(FrameSource& source, Slam& slam, const std::function<void(const FrameResult&)>& on_frame = {},
+               const std::stop_token& stop = {});
+
+}  // namespace roslam

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "roslam/features/orb_extractor.hpp"
+#include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/trajectory.hpp"
+#include "roslam/map/map.hpp"
+#include "roslam/mapping/local_mapper.hpp"
+#include "roslam/pipeline/mapping_worker.hpp"
+#include "roslam/pipeline/options.hpp"
+#include "roslam/pipeline/statistics.hpp"
+#include "roslam/sources/frame_source.hpp"
+#include "roslam/tracking/keyframe_policy.hpp"
+#include "roslam/tracking/tracker.hpp"
+
+namespace roslam {
+
+/// What became of a frame.
+struct FrameResult {
+  std::size_t index = 0;                ///< of the frame in its source
+  double timestamp = 0.0;               ///< seconds
+  TrackingState state = TrackingState::kInitialising;
+  std::optional<SE3> T_world_camera;    ///< as known now; later corrections show in Slam::trajectory()
+  int inliers = 0;                      ///< landmarks the pose rests on
+  bool is_keyframe = false;
+  double tracking_seconds = 0.0;        ///< processor time of the tracking thread
+};
+
+/// The pipeline: frames in, trajectory and map out.
+class Slam {
+ public:
+  /// Throws CalibrationError or OptionsError.
+  Slam(const Camera& camera, const Options& options = {}, Mode mode = Mode::kDeterministic);
+
+  /// Tracks a frame and, if it becomes a keyframe, maps it (in real-time mode: on another thread). mask: empty, or
+  /// CV_8UC1 of the frame's size, nonzero where nothing may be used (things that can move). Frames that cannot be
+  /// used (wrong size, time not increasing) give nothing and are counted.
+  std::optional<FrameResult> process(const Frame& frame, const cv::Mat& mask = {});
+
+  /// Waits for the mapper. Call before reading results.
+  void finish();
+
+  /// Poses of all tracked frames, with every later correction of the map, in the order of time.
+  Trajectory trajectory() const;
+
+  /// Poses of the keyframes still in the map.
+  Trajectory keyframes() const;
+
+  /// The map. In real-time mode only after finish().
+  const Map& map() const { return map_; }
+
+  const Camera& camera() const { return camera_; }
+  const Options& options() const { return options_; }
+  Mode mode() const { return mode_; }
+
+  /// Frames by state, and frames that could not be used by reason.
+  const std::map<TrackingState, std::size_t>& frames_by_state() const { return frames_by_state_; }
+  const std::map<std::string, std::size_t>& rejected() const { return rejected_; }
+  std::size_t frames() const { return records_.size(); }
+
+  /// Processor time of every stage so far.
+  StageTimes times() const;
+
+ private:
+  // The pose of a frame hangs on a keyframe, so that corrections of the map move it too.
+  struct Record {
+    double timestamp;
+    KeyframeId reference;  // none: not tracked
+    SE3 T_camera_reference;
+  };
+
+  bool is_usable(const Frame& frame);
+  std::shared_ptr<const ObservedFrame> extract(const Frame& frame, const cv::Mat& mask);
+  void record(const TrackedFrame& frame);
+  void note_times(double extract, double total);
+
+  Camera camera_;
+  Options options_;
+  Mode mode_;
+  OrbExtractor extractor_;
+  std::mutex map_mutex_;
+  Map map_;
+  Tracker tracker_;
+  KeyframePolicy keyframe_policy_;
+  LocalMapper mapper_;
+  std::vector<Record> records_;
+  std::map<TrackingState, std::size_t> frames_by_state_;
+  std::map<std::string, std::size_t> rejected_;
+  std::optional<double> last_timestamp_;
+  StageTimes times_;
+  MappingWorker mapping_;  // last, so that its thread stops before what it uses goes away
+};
+
+}  // namespace roslam

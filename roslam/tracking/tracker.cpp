@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/tracking/tracker.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "roslam/error.hpp"
+#include "roslam/geometry/stopwatch.hpp"
+
+namespace roslam {
+
+namespace {
+// Marks points matched with points of the last frame that are not landmarks: they help with the pose and are
+// forgotten afterwards.
+constexpr LandmarkId kTemporary{LandmarkId::kNone - 1};
+
+// World axes of the first camera, taken to look ahead and level: x forward, y left, z up (REP 103).
+SE3 first_T_camera_world() {
+  Eigen::Matrix3d R;
+  R << 0, -1, 0,  //
+      0, 0, -1,   //
+      1, 0, 0;
+  return {R, Eigen::Vector3d::Zero()};
+}
+}  // namespace
+
+std::string_view name_of(TrackingState state) {
+  switch (state) {
+    case TrackingState::kInitialising:
+      return "initialising";
+    case TrackingState::kTracking:
+      return "tracking";
+    case TrackingState::kRecentlyLost:
+      return "recently lost";
+    case TrackingState::kLost:
+      return "lost";
+  }
+  return "unknown";
+}
+
+void TrackerOptions::validate() const {
+  if (min_initial_points < 10) throw OptionsError("tracker.min_initial_points must be at least 10");
+  if (min_inliers < 6) throw OptionsError("tracker.min_inliers must be at least 6");
+  if (min_frame_matches < 6) throw OptionsError("tracker.min_frame_matches must be at least 6");
+  if (recently_lost_frames < 0) throw OptionsError("tracker.recently_lost_frames must not be negative");
+}
+
+Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
+    : camera_(camera),
+      map_(map),
+      settings_(settings),
+      matcher_(settings.matcher),
+      local_map_(settings.local_map),
+      relocaliser_(settings.relocaliser, settings.matcher) {
+  settings.tracker.validate();
+  settings.matcher.validate();
+  settings.pose.validate();
+  settings.local_map.validate();
+  settings.relocaliser.validate();
+  settings.noise.validate();
+}
+
+TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double timestamp) {
+  times_ = {};
+  TrackedFrame frame;
+  frame.timestamp = timestamp;
+  frame.landmarks.resize(view->size());
+  frame.view = std::move(view);
+  if (map_.keyframe_count() == 0) return initialise(std::move(frame));
+
+  const bool found = state_ == TrackingState::kTracking ? follow(frame) || relocalise(frame) : relocalise(frame);
+  if (found) {
+    state_ = TrackingState::kTracking;
+    frames_lost_ = 0;
+    count_predictions(frame);
+    remember(frame);
+  } else {
+    ++frames_lost_;
+    state_ = frames_lost_ <= settings_.tracker.recently_lost_frames ? TrackingState::kRecentlyLost
+                                                                    : TrackingState::kLost;
+    velocity_age_ = -1.0;
+    frame.T_camera_world.reset();
+    frame.inliers = 0;
+    frame.landmarks.assign(frame.view->size(), {});
+  }
+  frame.state = state_;
+  return frame;
+}
+
+TrackedFrame Tracker::initialise(TrackedFrame frame) {
+  const auto& depths = frame.view->depths;
+  const auto known = std::count_if(depths.begin(), depths.end(), [](float d) { return d > 0.0F; });
+  if (known >= settings_.tracker.min_initial_points) {
+    frame.T_camera_world = first_T_camera_world();
+    state_ = TrackingState::kTracking;
+    last_ = frame;
+  }
+  frame.state = state_;
+  return frame;
+}
+
+bool Tracker::follow(TrackedFrame& frame) {
+  const SE3 predicted = predict_pose(frame.timestamp);
+  constexpr float kWider = 3.0F;
+  const bool matched = match_last_frame(frame, predicted, 1.0F) || match_last_frame(frame, predicted, kWider) ||
+                       match_reference(frame);
+  return matched && refine_with_local_map(frame);
+}
+
+SE3 Tracker::last_pose() const {
+  return last_.reference.is_valid() ? T_last_reference_ * map_.T_camera_world(last_.reference)
+                                    : *last_.T_camera_world;
+}
+
+SE3 Tracker::predict_pose(double timestamp) const {
+  const SE3 last = last_pose();
+  return velocity_age_ < 0.0 ? last : SE3::exp(velocity_ * (timestamp - last_.timestamp)) * last;
+}
+
+bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor) {
+  const Stopwatch watch;
+  frame.landmarks.assign(frame.view->size(), {});
+  const SE3 T_world_last = last_pose().inverse();
+  const ObservedFrame& last = *last_.view;
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<std::uint32_t> points;
+  std::vector<float> turns;
+  for (std::size_t i = 0; i < last.size(); ++i) {
+    const LandmarkId id = map_.resolve(last_.landmarks[i]);
+    const Landmark* landmark = map_.find(id);
+    if (landmark == nullptr && last.depths[i] <= 0.0F) continue;
+    const Eigen::Vector3d position =
+        landmark != nullptr ? landmark->position
+                            : T_world_last * camera_.unproject(last.pixels[i].cast<double>(), last.depths[i]);
+    const Eigen::Vector3d in_camera = predicted * position;
+    if (in_camera.z() <= 0.0) continue;
+    const Eigen::Vector2f pixel = camera_.project(in_camera).cast<float>();
+    if (!frame.view->grid.contains(pixel)) continue;
+    const int level = last.levels[i];
+    const float radius = radius_factor * static_cast<float>(settings_.matcher.frame_radius) * map_.scale(level);
+    const int match = matcher_.find({pixel, radius, level - 1, level + 1, static_cast<float>(in_camera.z()),
+                                     settings_.matcher.max_distance, false},
+                                    last.descriptors[i], *frame.view, frame.landmarks);
+    if (match < 0) continue;
+    frame.landmarks[static_cast<std::size_t>(match)] = landmark != nullptr ? id : kTemporary;
+    positions.push_back(position);
+    points.push_back(static_cast<std::uint32_t>(match));
+    turns.push_back(last.angles[i] - frame.view->angles[static_cast<std::size_t>(match)]);
+  }
+  const auto keep = consistent_rotation(turns);
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (keep[k]) {
+      positions[kept] = positions[k];
+      points[kept++] = points[k];
+    } else {
+      frame.landmarks[points[k]] = {};
+    }
+  }
+  positions.resize(kept);
+  points.resize(kept);
+  times_.match_frame += watch.seconds();
+  frame.T_camera_world = predicted;
+  const bool good = estimate(frame, positions, points, settings_.tracker.min_frame_matches);
+  std::replace(frame.landmarks.begin(), frame.landmarks.end(), kTemporary, LandmarkId{});
+  return good;
+}
+
+bool Tracker::match_reference(TrackedFrame& frame) {
+  const Keyframe* reference = map_.find(last_.reference);
+  if (reference == nullptr) return false;
+  const Stopwatch watch;
+  std::vector<std::uint32_t> known;
+  for (std::uint32_t i = 0; i < reference->landmarks.size(); ++i) {
+    if (reference->landmarks[i].is_valid()) known.push_back(i);
+  }
+  frame.landmarks.assign(frame.view->size(), {});
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<std::uint32_t> points;
+  for (const auto& [theirs, ours] : match_descriptors(*reference->view, known, *frame.view, settings_.matcher)) {
+    frame.landmarks[ours] = reference->landmarks[theirs];
+    positions.push_back(map_.find(reference->landmarks[theirs])->position);
+    points.push_back(ours);
+  }
+  times_.match_frame += watch.seconds();
+  frame.T_camera_world = last_pose();
+  return estimate(frame, positions, points, settings_.tracker.min_frame_matches);
+}
+
+// Optimises the pose on matches of points with positions in the world; forgets the outliers.
+bool Tracker::estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
+                       const std::vector<std::uint32_t>& points, int min_inliers) {
+  if (static_cast<int>(points.size()) < min_inliers) return false;
+  const Stopwatch watch;
+  const ObservedFrame& view = *frame.view;
+  std::vector<PoseMeasurement> measurements(points.size());
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const std::uint32_t i = points[k];
+    measurements[k].point_world = positions[k];
+    measurements[k].measurement =
+        Measurement::make(view.pixels[i], view.depths[i], map_.scale(view.levels[i]), settings_.noise);
+  }
+  const OptimisedPose pose = optimise_pose(camera_, measurements, *frame.T_camera_world, settings_.pose);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (!pose.is_inlier[k]) frame.landmarks[points[k]] = {};
+  }
+  frame.T_camera_world = pose.T_camera_world;
+  frame.inliers = pose.inliers;
+  times_.optimise += watch.seconds();
+  return pose.inliers >= min_inliers;
+}
+
+void Tracker::match_local_landmarks(TrackedFrame& frame, const std::vector<LandmarkId>& landmarks,
+                                    double radius_factor) {
+  std::vector<bool> is_matched(map_.landmark_slots(), false);
+  for (const LandmarkId id : frame.landmarks) {
+    if (id.is_valid()) is_matched[id.index()] = true;
+  }
+  constexpr float kFrontal = 0.998F;  // seen from almost the same direction, a landmark is searched for more closely
+  for (const LandmarkId id : landmarks) {
+    if (is_matched[id.index()]) continue;
+    Landmark& landmark = *map_.find(id);
+    const auto predicted = predict(landmark, map_, *frame.view, camera_, *frame.T_camera_world);
+    if (!predicted) continue;
+    ++landmark.predicted;
+    const float closeness = predicted->view_cosine > kFrontal ? 2.5F : 4.0F;
+    const float radius = closeness * static_cast<float>(radius_factor) * map_.scale(predicted->level);
+    const int match = matcher_.find({predicted->pixel, radius, predicted->level - 1, predicted->level + 1,
+                                     predicted->depth, settings_.matcher.max_distance, true},
+                                    landmark.descriptor, *frame.view, frame.landmarks);
+    if (match >= 0) frame.landmarks[static_cast<std::size_t>(match)] = id;
+  }
+}
+
+bool Tracker::refine_with_local_map(TrackedFrame& frame) {
+  const Stopwatch watch;
+  local_map_.update(map_, frame.landmarks, last_.reference);
+  frame.reference = local_map_.reference();
+  match_local_landmarks(frame, local_map_.landmarks(), settings_.matcher.map_radius);
+  times_.match_map += watch.seconds();
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<std::uint32_t> points;
+  for (std::uint32_t i = 0; i < frame.landmarks.size(); ++i) {
+    if (!frame.landmarks[i].is_valid()) continue;
+    positions.push_back(map_.find(frame.landmarks[i])->position);
+    points.push_back(i);
+  }
+  return estimate(frame, positions, points, settings_.tracker.min_inliers);
+}
+
+bool Tracker::relocalise(TrackedFrame& frame) {
+  const Stopwatch watch;
+  const auto found =
+      relocaliser_.find(map_, *frame.view, camera_, frames_lost_ >= settings_.tracker.recently_lost_frames);
+  times_.relocalise += watch.seconds();
+  if (!found) return false;
+  frame.T_camera_world = found->T_camera_world;
+  frame.landmarks = found->landmarks;
+  velocity_age_ = -1.0;
+  last_.reference = found->keyframe;
+  // A wrong place must not be taken for the right one: the local map has to confirm it twice as strongly.
+  return refine_with_local_map(frame) && frame.inliers >= 2 * settings_.tracker.min_inliers;
+}
+
+void Tracker::count_predictions(const TrackedFrame& frame) {
+  for (const LandmarkId id : frame.landmarks) {
+    if (!id.is_valid()) continue;
+    Landmark& landmark = *map_.find(id);
+    ++landmark.found;
+    landmark.predicted = std::max(landmark.predicted, landmark.found);
+  }
+}
+
+void Tracker::remember(const TrackedFrame& frame) {
+  const double elapsed = frame.timestamp - last_.timestamp;
+  constexpr double kMaxGap = 0.5;  // seconds; after a longer gap the old motion tells nothing
+  if (last_.view != nullptr && elapsed > 0.0 && elapsed < kMaxGap) {
+    velocity_ = (*frame.T_camera_world * last_pose().inverse()).log() / elapsed;
+    velocity_age_ = frame.timestamp;
+  } else {
+    velocity_age_ = -1.0;
+  }
+  last_ = frame;
+  T_last_reference_ = *frame.T_camera_world * map_.T_camera_world(frame.reference).inverse();
+}
+
+void Tracker::promoted(KeyframeId id) {
+  const Keyframe& keyframe = *map_.find(id);
+  last_.reference = id;
+  last_.landmarks = keyframe.landmarks;
+  T_last_reference_ = SE3();
+}
+
+}  // namespace roslam

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "roslam/features/observed_frame.hpp"
+#include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/reprojection.hpp"
+#include "roslam/geometry/se3.hpp"
+#include "roslam/map/map.hpp"
+#include "roslam/tracking/local_map.hpp"
+#include "roslam/tracking/pose_optimiser.hpp"
+#include "roslam/tracking/projection_matcher.hpp"
+#include "roslam/tracking/relocaliser.hpp"
+
+namespace roslam {
+
+enum class TrackingState {
+  kInitialising,  ///< no map yet: waiting for a picture with enough points of known depth
+  kTracking,      ///< the pose is known
+  kRecentlyLost,  ///< the pose was known a moment ago; searching near the last keyframes
+  kLost           ///< searching among all keyframes
+};
+
+std::string_view name_of(TrackingState state);
+
+struct TrackerOptions {
+  int min_initial_points = 80;     ///< points of known depth the first keyframe needs
+  int min_inliers = 20;            ///< landmarks a pose must rest on
+  int min_frame_matches = 15;      ///< matches with the last frame for its prediction to count
+  int recently_lost_frames = 30;   ///< frames after which recently lost becomes lost
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+};
+
+/// What tracking found out about a frame.
+struct TrackedFrame {
+  TrackingState state = TrackingState::kInitialising;
+  double timestamp = 0.0;                     ///< seconds
+  std::shared_ptr<const ObservedFrame> view;
+  std::optional<SE3> T_camera_world;          ///< empty unless state is kTracking
+  std::vector<LandmarkId> landmarks;          ///< landmark each point shows, or none; inliers only
+  int inliers = 0;                            ///< landmarks the pose rests on
+  KeyframeId reference;                       ///< keyframe that shares most landmarks; none before the first keyframe
+};
+
+/// Estimates the pose of each frame against the map: predicts it from the motion so far, matches with the last
+/// frame, then with the local map; recovers against the keyframes when lost. Changes nothing in the map but the
+/// landmarks' counters of predicted and found.
+class Tracker {
+ public:
+  struct Settings {
+    TrackerOptions tracker;
+    MatcherOptions matcher;
+    PoseOptimiserOptions pose;
+    LocalMapOptions local_map;
+    RelocaliserOptions relocaliser;
+    MeasurementNoise noise;
+  };
+
+  Tracker(const Camera& camera, Map& map, const Settings& settings);
+
+  /// Frames must come in the order of time.
+  TrackedFrame track(std::shared_ptr<const ObservedFrame> view, double timestamp);
+
+  /// Tells that the frame tracked last became this keyframe (its landmarks are taken over).
+  void promoted(KeyframeId keyframe);
+
+  TrackingState state() const { return state_; }
+
+  /// Seconds the last call spent in each step, for the report.
+  struct Times {
+    double match_frame = 0.0;
+    double match_map = 0.0;
+    double optimise = 0.0;
+    double relocalise = 0.0;
+  };
+  const Times& times() const { return times_; }
+
+ private:
+  TrackedFrame initialise(TrackedFrame frame);
+  bool follow(TrackedFrame& frame);
+  bool match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor);
+  bool match_reference(TrackedFrame& frame);
+  bool refine_with_local_map(TrackedFrame& frame);
+  bool relocalise(TrackedFrame& frame);
+  bool estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
+                const std::vector<std::uint32_t>& points, int min_inliers);
+  void match_local_landmarks(TrackedFrame& frame, const std::vector<LandmarkId>& landmarks, double radius_factor);
+  void count_predictions(const TrackedFrame& frame);
+  SE3 predict_pose(double timestamp) const;
+  SE3 last_pose() const;
+  void remember(const TrackedFrame& frame);
+
+  Camera camera_;
+  Map& map_;
+  Settings settings_;
+  ProjectionMatcher matcher_;
+  LocalMap local_map_;
+  Relocaliser relocaliser_;
+
+  TrackingState state_ = TrackingState::kInitialising;
+  TrackedFrame last_;             // the last frame with a pose
+  SE3 T_last_reference_;          // its pose in its reference keyframe, which bundle adjustment may move
+  Vector6d velocity_ = Vector6d::Zero();  // twist of T_current_last, per second
+  double velocity_age_ = -1.0;    // time of the frame velocity_ was measured at; negative = unknown
+  int frames_lost_ = 0;
+  Times times_;
+};
+
+}  // namespace roslam
