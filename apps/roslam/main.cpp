@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   CLI::App program("RO-SLAM: visual SLAM for drones that fly where things move.");
   program.require_subcommand(1);
   program.set_version_flag("--version", ROSLAM_VERSION);
+  roslam::app::add_run_command(program, ROSLAM_VERSION);
   roslam::app::add_simulate_command(program);
   roslam::app::add_evaluate_command(program);
   try {

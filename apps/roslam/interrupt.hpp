@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <stop_token>
+#include <thread>
+
+namespace roslam::app {
+
+/// Turns ctrl-C and a termination request into a stop token. Make one before any other thread starts: it keeps the
+/// signals from interrupting them. A second ctrl-C ends the program at once.
+class InterruptWatcher {
+ public:
+  InterruptWatcher();
+  InterruptWatcher(const InterruptWatcher&) = delete;
+  InterruptWatcher& operator=(const InterruptWatcher&) = delete;
+  ~InterruptWatcher();
+
+  std::stop_token token() const { return stop_.get_token(); }
+
+ private:
+  void watch();
+
+  std::stop_source stop_;
+  int signals_ = -1;  // file descriptor the signals arrive at
+  int leave_ = -1;    // file descriptor that ends the thread
+  std::jthread thread_;
+};
+
+}  // namespace roslam::app

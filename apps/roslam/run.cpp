@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/roslam/commands.hpp"
+#include "apps/roslam/interrupt.hpp"
+#include "apps/roslam/progress.hpp"
+#include "apps/roslam/sources.hpp"
+#include "roslam/error.hpp"
+#include "roslam/pipeline/run.hpp"
+#include "roslam/pipeline/run_folder.hpp"
+#include "roslam/pipeline/slam.hpp"
+
+namespace roslam::app {
+
+namespace {
+struct RunArguments {
+  std::string source;
+  std::string camera;
+  std::string out;
+  std::string config;
+  bool deterministic = false;
+  bool real_time = false;
+  bool print_config = false;
+  bool quiet = false;
+  bool json = false;
+  std::uint64_t seed = 1;
+};
+
+void require_frames(const Slam& slam, const FrameSource& source, const std::string& name) {
+  if (slam.frames() > 0) return;
+  std::string reasons;
+  for (const auto& [reason, count] : source.skipped()) reasons += "; " + std::to_string(count) + " x " + reason;
+  for (const auto& [reason, count] : slam.rejected()) reasons += "; " + std::to_string(count) + " x " + reason;
+  throw InputError(name + ": no frame could be used" + reasons);
+}
+
+void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder& folder) {
+  const auto times = slam.times().summary();
+  const std::size_t tracked = slam.trajectory().size();
+  std::printf("tracked %zu of %zu frames (%.1f %%), %zu dropped\n", tracked, slam.frames(),
+              100.0 * static_cast<double>(tracked) / static_cast<double>(slam.frames()), summary.dropped);
+  std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(), slam.map().landmark_count());
+  if (const auto found = times.find("tracking"); found != times.end()) {
+    std::printf("tracking: median %.1f ms, p95 %.1f ms of processor time a frame\n", found->second.median_ms,
+                found->second.p95_ms);
+  }
+  std::printf("results: %s\n", folder.path().c_str());
+}
+
+void execute(const RunArguments& arguments, const std::string& version) {
+  const Options options = arguments.config.empty() ? Options{} : read_options(arguments.config);
+  if (arguments.print_config) {
+    std::cout << options_to_yaml(options);
+    return;
+  }
+  if (arguments.source.empty()) throw CLI::RequiredError("SOURCE");
+  if (arguments.out.empty()) throw CLI::RequiredError("--out");
+  const InterruptWatcher interrupt;
+  const auto source = open_source(arguments.source, arguments.camera, arguments.seed);
+  const RunFolder folder(arguments.out);
+  Slam slam(source->camera(), options, arguments.real_time ? Mode::kRealTime : Mode::kDeterministic);
+  RunSummary summary;
+  {
+    Progress progress(source->size(), arguments.quiet || arguments.json);
+    summary = run(
+        *source, slam, [&](const FrameResult& frame) { progress.show(frame.index + 1, name_of(frame.state)); },
+        interrupt.token());
+  }
+  const RunDescription description{arguments.source, arguments.camera, version};
+  folder.write(slam, summary, *source, description);
+  require_frames(slam, *source, arguments.source);
+  if (arguments.json) {
+    std::cout << nlohmann::json::parse(run_report(slam, summary, *source, description)).dump() << "\n";
+  } else {
+    print_summary(slam, summary, folder);
+  }
+}
+}  // namespace
+
+void add_run_command(CLI::App& program, const std::string& version) {
+  const auto arguments = std::make_shared<RunArguments>();
+  CLI::App* command = program.add_subcommand("run", "Track a recorded or simulated flight and map what it sees");
+  command->footer(
+      "Examples:\n"
+      "  roslam run simulated:street --out street\n"
+      "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n"
+      "  roslam run my_flight --camera my_camera.yaml --real-time --out live\n"
+      "RUN then holds trajectory.txt and keyframes.txt (TUM format), map.ply, trajectory.png and run.json.");
+  command->add_option("SOURCE", arguments->source,
+                      "A folder in TUM RGB-D format, or simulated:street, simulated:loop, simulated:hover, "
+                      "simulated:turn");
+  command->add_option("--camera", arguments->camera,
+                      "A preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file");
+  command->add_option("--out", arguments->out, "Folder the results are written to; made if it does not exist");
+  command->add_option("--config", arguments->config, "YAML file with options; --print-config shows them all");
+  auto* deterministic = command->add_flag("--deterministic", arguments->deterministic,
+                                          "One stage after the other: the same input gives the same bytes (default)");
+  command
+      ->add_flag("--real-time", arguments->real_time,
+                 "Stages on threads, frames at the pace of their timestamps; late frames are dropped and counted")
+      ->excludes(deterministic);
+  command->add_option("--seed", arguments->seed, "Seed of a simulated flight")->capture_default_str();
+  command->add_flag("--print-config", arguments->print_config, "Print the effective options and stop");
+  command->add_flag("--quiet", arguments->quiet, "No progress");
+  command->add_flag("--json", arguments->json, "Print the report as one JSON object");
+  command->callback([arguments, version] { execute(*arguments, version); });
+}
+
+}  // namespace roslam::app

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "roslam/pipeline/run.hpp"
+#include "roslam/pipeline/slam.hpp"
+#include "roslam/sources/frame_source.hpp"
+
+namespace roslam {
+
+/// What a run was asked to do, for its report.
+struct RunDescription {
+  std::string source;   ///< as the user named it
+  std::string camera;   ///< as the user named it
+  std::string version;  ///< of the program
+};
+
+/// Where the results of a run go:
+///   trajectory.txt  poses of all tracked frames (TUM format)
+///   keyframes.txt   poses of the keyframes (TUM format)
+///   map.ply         landmarks with colour
+///   trajectory.png  the way flown, seen from above
+///   run.json        effective options, counts, times of every stage, memory
+class RunFolder {
+ public:
+  /// Creates the folder. Throws OutputError at once, before any work is lost, if nothing can be written there.
+  explicit RunFolder(const std::filesystem::path& path);
+
+  /// Writes all results. What fails does not keep the others from being written; the first failure is thrown as
+  /// OutputError at the end.
+  void write(const Slam& slam, const RunSummary& summary, const FrameSource& source,
+             const RunDescription& description) const;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// The contents of run.json.
+std::string run_report(const Slam& slam, const RunSummary& summary, const FrameSource& source,
+                       const RunDescription& description);
+
+/// Writes text to a file. Throws OutputError if it cannot be written in full.
+void write_text(const std::filesystem::path& file, const std::string& text);
+
+}  // namespace roslam

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "roslam/pipeline/run_folder.hpp"
+
+namespace roslam {
+
+namespace {
+using Json = nlohmann::ordered_json;
+
+double rounded(double value, int decimals) {
+  const double factor = std::pow(10.0, decimals);
+  return std::round(value * factor) / factor;
+}
+
+Json camera_json(const Camera& camera) {
+  return {{"width", camera.width},
+          {"height", camera.height},
+          {"fx", camera.fx},
+          {"fy", camera.fy},
+          {"cx", camera.cx},
+          {"cy", camera.cy},
+          {"distortion", camera.distortion},
+          {"depth_units_per_metre", camera.depth_units_per_metre},
+          {"fps", camera.fps}};
+}
+
+Json frames_json(const Slam& slam, const RunSummary& summary, const FrameSource& source) {
+  std::size_t tracked = 0;
+  Json by_state = Json::object();
+  for (const auto& [state, count] : slam.frames_by_state()) {
+    by_state[std::string(name_of(state))] = count;
+    if (state == TrackingState::kTracking) tracked = count;
+  }
+  std::size_t rejected = 0;
+  Json skipped = Json::object();
+  for (const auto& [reason, count] : source.skipped()) skipped[reason] = count;
+  for (const auto& [reason, count] : slam.rejected()) {
+    skipped[reason] = skipped.value(reason, std::size_t{0}) + count;
+    rejected += count;
+  }
+  const std::size_t arrived = slam.frames() + rejected + summary.dropped;
+  return {{"in_source", source.size().value_or(arrived)},
+          {"processed", slam.frames()},
+          {"tracked", tracked},
+          {"tracked_share", slam.frames() == 0 ? 0.0 : static_cast<double>(tracked) / static_cast<double>(slam.frames())},
+          {"dropped", summary.dropped},
+          {"by_state", by_state},
+          {"skipped", skipped}};
+}
+
+Json times_json(const StageTimes& times) {
+  Json json = Json::object();
+  for (const auto& [stage, s] : times.summary()) {
+    json[stage] = {{"count", s.count},
+                   {"median", rounded(s.median_ms, 3)},
+                   {"p95", rounded(s.p95_ms, 3)},
+                   {"max", rounded(s.max_ms, 3)}};
+  }
+  return json;
+}
+
+double path_length(const Trajectory& trajectory) {
+  double length = 0.0;
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    length += (trajectory[i].T_world_camera.translation() - trajectory[i - 1].T_world_camera.translation()).norm();
+  }
+  return length;
+}
+}  // namespace
+
+std::string run_report(const Slam& slam, const RunSummary& summary, const FrameSource& source,
+                       const RunDescription& description) {
+  const double per_second = summary.wall_seconds > 0.0 ? static_cast<double>(slam.frames()) / summary.wall_seconds : 0.0;
+  Json json;
+  json["version"] = description.version;
+  json["source"] = description.source;
+  json["mode"] = slam.mode() == Mode::kDeterministic ? "deterministic" : "real-time";
+  json["interrupted"] = summary.interrupted;
+  json["frames"] = frames_json(slam, summary, source);
+  json["keyframes"] = slam.map().keyframe_count();
+  json["landmarks"] = slam.map().landmark_count();
+  json["path_length_metres"] = rounded(path_length(slam.trajectory()), 3);
+  json["wall_seconds"] = rounded(summary.wall_seconds, 3);
+  json["frames_per_second"] = rounded(per_second, 2);
+  json["first_pose_seconds"] = rounded(summary.first_pose_seconds, 3);
+  json["peak_memory_megabytes"] = rounded(static_cast<double>(peak_memory()) / 1048576.0, 1);
+  json["processor_milliseconds"] = times_json(slam.times());
+  json["camera"] = camera_json(slam.camera());
+  json["camera"]["name"] = description.camera;
+  json["options"] = Json::parse(options_to_json(slam.options()));
+  return json.dump(2) + "\n";
+}
+
+}  // namespace roslam
