@@ -49,7 +49,8 @@ std::vector<double> times_of(const std::vector<PosePair>& pairs) {
   return times;
 }
 
-// The truth may be at a higher rate than the pairs: its own poses between theirs follow the path more closely.
+// The truth may be at a higher rate than the pairs: its own poses between theirs follow the path more
+// closely.
 double path_length(const Trajectory& truth, const StampedPose& from, const StampedPose& to) {
   double length = 0.0;
   Eigen::Vector3d last = from.T_world_camera.translation();
