@@ -171,11 +171,11 @@ void add_evaluate_trajectory_command(CLI::App& evaluate) {
           "--estimate", arguments->estimates,
           "Estimated trajectories or run folders, also as NAME=FILE; of several runs the median is added")
       ->required()
-      ->type_name("FILE...");
+      ->type_name("FILE");
   command
       ->add_option("--against", arguments->others,
                    "Further trajectories to compare with, also as NAME=FILE; no part of the median")
-      ->type_name("FILE...");
+      ->type_name("FILE");
   command->add_option("--plot", arguments->plot, "Draw paths and errors into this PNG file")
       ->type_name("FILE.png");
   command->add_flag("--json", arguments->json, "Print one JSON object instead of tables");
@@ -193,7 +193,7 @@ void add_evaluate_trajectory_command(CLI::App& evaluate) {
   command
       ->add_option("--view", arguments->up,
                    "Plane of the figure: auto (the widest), xy (z is up) or xz (y is down)")
-      ->transform(CLI::Transformer(views))
+      ->transform(CLI::CheckedTransformer(views).description(""))
       ->type_name("auto|xy|xz");
   command->footer(kExamples);
   command->callback([arguments] {

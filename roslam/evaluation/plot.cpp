@@ -17,11 +17,13 @@ constexpr double kMargin = 14.0;
 constexpr double kRowHeight = 22.0;
 constexpr double kLegendSample = 30.0;
 constexpr double kLegendGap = 22.0;
+constexpr double kLegendIndent = 58.0;  // about where the diagram begins
 constexpr double kTickLength = 5.0;
 constexpr double kBarWidth = 14.0;
 constexpr double kPixelsPerTick = 55.0;
 constexpr double kPadding = 0.05;  // of the data's range, on each side
 constexpr double kMarkerRadius = 5.5;
+constexpr double kLeastSpan = 1e-6;  // of an axis in its unit: below it there is only rounding noise
 
 bool is_finite(const cv::Point2d& point) { return std::isfinite(point.x) && std::isfinite(point.y); }
 
@@ -43,8 +45,8 @@ int tick_count(double pixels) { return std::max(2, static_cast<int>(pixels / kPi
 // A range of no extent, or of none but rounding noise, would stretch that noise over the whole axis.
 Range padded(Range range, bool from_zero) {
   const double magnitude = std::max(std::abs(range.min), std::abs(range.max));
-  if (range.span() <= 1e-9 * magnitude || range.span() <= 1e-12) {
-    const double room = magnitude > 0.0 ? 0.1 * magnitude : 1.0;
+  if (range.span() <= std::max(1e-9 * magnitude, kLeastSpan)) {
+    const double room = std::max(0.1 * magnitude, kLeastSpan);
     range = {range.min - room, range.max + room};
   }
   const double room = kPadding * range.span();
@@ -122,12 +124,12 @@ Range Plot::value_range() const {
     }
   }
   if (!(range.min <= range.max)) return {0.0, 1.0};
-  return range.span() > 1e-12 ? range : padded(range, false);
+  return {range.min, std::max(range.max, range.min + kLeastSpan)};
 }
 
 // In rows below the title rather than inside the diagram, where it would lie on lines sooner or later.
 std::vector<Plot::LegendEntry> Plot::legend(const cv::Rect2d& area) const {
-  const double left = area.x + kMargin;
+  const double left = area.x + kLegendIndent;
   const double right = area.x + area.width - kMargin;
   cv::Point2d at(left, area.y + kMargin + kTitleSize + 6.0 + 0.5 * kRowHeight);
   std::vector<LegendEntry> entries;

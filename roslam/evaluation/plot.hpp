@@ -25,8 +25,11 @@ std::vector<std::string> tick_labels(const std::vector<double>& ticks);
 /// Colour of a value on the scale from 0 (blue) over green to 1 (red); values outside are clamped.
 Colour scale_colour(double share);
 
-/// Colours that tell lines apart, for colour-blind readers too; they repeat after eight.
+/// Colours that tell eight lines apart, for colour-blind readers too; then they repeat.
 Colour line_colour(std::size_t index);
+
+/// A line in that colour; dashed where the colour is a repeated one.
+LineStyle line_style(std::size_t index);
 
 /// One diagram: axes, grid, lines, legend and colour bar, laid out so that nothing overlaps.
 class Plot {

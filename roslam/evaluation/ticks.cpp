@@ -9,6 +9,19 @@
 
 namespace roslam {
 
+namespace {
+// Red, green, blue. The order of Okabe and Ito's palette is changed so that the first two differ most; black
+// and grey are left to the truth.
+constexpr std::array<std::array<int, 3>, 8> kLineColours{{{0, 114, 178},
+                                                          {213, 94, 0},
+                                                          {0, 158, 115},
+                                                          {204, 121, 167},
+                                                          {230, 159, 0},
+                                                          {86, 180, 233},
+                                                          {120, 80, 40},
+                                                          {150, 60, 200}}};
+}  // namespace
+
 std::vector<double> nice_ticks(const Range& range, int max_count) {
   // Allows a tick that rounding pushed just outside the range.
   constexpr double kSlack = 1e-9;
@@ -56,18 +69,12 @@ Colour scale_colour(double share) {
 }
 
 Colour line_colour(std::size_t index) {
-  // The order of Okabe and Ito's palette is changed so that the first two differ most; black is left to the
-  // truth.
-  constexpr std::array<std::array<int, 3>, 8> kRgb{{{0, 114, 178},
-                                                    {213, 94, 0},
-                                                    {0, 158, 115},
-                                                    {204, 121, 167},
-                                                    {230, 159, 0},
-                                                    {86, 180, 233},
-                                                    {120, 80, 40},
-                                                    {150, 60, 200}}};
-  const auto& rgb = kRgb[index % kRgb.size()];
+  const auto& rgb = kLineColours[index % kLineColours.size()];
   return {static_cast<double>(rgb[2]), static_cast<double>(rgb[1]), static_cast<double>(rgb[0])};
+}
+
+LineStyle line_style(std::size_t index) {
+  return {line_colour(index), 1.8, index / kLineColours.size() % 2 == 1};
 }
 
 }  // namespace roslam

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
-#include <string_view>
 
 #include "roslam/error.hpp"
 #include "roslam/evaluation/plot.hpp"
@@ -16,9 +15,9 @@
 namespace roslam {
 
 namespace {
-constexpr int kWidth = 1640;
+constexpr int kWidth = 1670;
 constexpr int kHeight = 720;
-constexpr double kLeftShare = 0.5;
+constexpr double kGutter = 30.0;  // between the two diagrams
 
 LineStyle truth_style() { return {{130, 130, 130}, 1.8, true}; }
 Colour start_colour() { return {80, 160, 40}; }
@@ -49,9 +48,15 @@ View choose_view(const Trajectory& trajectory, WorldUp up) {
   return {0, 1, 2, 1.0};
 }
 
+char axis_name(int axis) { return "xyz"[axis]; }
+
 std::string axis_label(int axis, double sign = 1.0) {
-  constexpr std::string_view kNames = "xyz";
-  return std::string(sign < 0.0 ? "-" : "") + kNames[static_cast<std::size_t>(axis)] + " [m]";
+  return std::string(sign < 0.0 ? "-" : "") + axis_name(axis) + " [m]";
+}
+
+std::string map_title(const View& view, WorldUp up) {
+  if (up != WorldUp::kUnknown) return "Trajectory from above";
+  return std::string("Trajectory in the ") + axis_name(view.right) + "-" + axis_name(view.up) + " plane";
 }
 
 std::string metres(double value) {
@@ -123,10 +128,10 @@ TimedLine map_of(const Trajectory& trajectory, const View& view, double start) {
   return interrupted(times, points, values);
 }
 
-Plot paths_plot(const Trajectory& truth, const std::vector<NamedTrajectoryError>& estimates,
-                const View& view) {
+Plot paths_plot(const Trajectory& truth, const std::vector<NamedTrajectoryError>& estimates, WorldUp up) {
   const bool single = estimates.size() == 1;
-  Plot plot("Trajectory from above");
+  const View view = choose_view(truth, up);
+  Plot plot(map_title(view, up));
   plot.set_equal_aspect();
   plot.set_labels(axis_label(view.right), axis_label(view.up));
   plot.add_line(map_of(truth, view, 0.0).points, truth_style(), "truth");
@@ -135,21 +140,22 @@ Plot paths_plot(const Trajectory& truth, const std::vector<NamedTrajectoryError>
     if (single) {
       plot.add_coloured_line(std::move(points), std::move(values), "absolute error [m]", estimates[i].name);
     } else {
-      plot.add_line(std::move(points), {line_colour(i), 1.8}, estimates[i].name);
+      plot.add_line(std::move(points), line_style(i), estimates[i].name);
     }
   }
   return plot;
 }
 
-Plot errors_plot(const Trajectory& truth, const std::vector<NamedTrajectoryError>& estimates) {
+Plot errors_plot(const std::vector<NamedTrajectoryError>& estimates) {
   Plot plot("Absolute trajectory error over time");
   plot.set_y_from_zero();
   plot.set_labels("time [s]", "absolute error [m]");
-  const double start = truth.front().timestamp;
+  double start = std::numeric_limits<double>::infinity();
+  for (const auto& estimate : estimates) start = std::min(start, estimate.error.poses.front().timestamp);
   for (std::size_t i = 0; i < estimates.size(); ++i) {
     const auto& [name, error] = estimates[i];
     const bool single = estimates.size() == 1;
-    plot.add_line(error_over_time(error, start).points, {line_colour(i), 1.8},
+    plot.add_line(error_over_time(error, start).points, line_style(i),
                   single ? "error" : name + " (RMSE " + metres(error.ate.rmse) + ")");
     if (!single) continue;
     plot.add_level(error.ate.rmse, {line_colour(1), 1.8, true}, "RMSE " + metres(error.ate.rmse));
@@ -161,16 +167,19 @@ Plot errors_plot(const Trajectory& truth, const std::vector<NamedTrajectoryError
 
 cv::Mat side_by_side(const Plot& left, const Plot& right) {
   Canvas canvas(kWidth, kHeight);
-  left.draw(canvas, {0.0, 0.0, kLeftShare * kWidth, kHeight});
-  right.draw(canvas, {kLeftShare * kWidth, 0.0, (1.0 - kLeftShare) * kWidth, kHeight});
+  const double width = 0.5 * (kWidth - kGutter);
+  left.draw(canvas, {0.0, 0.0, width, kHeight});
+  right.draw(canvas, {width + kGutter, 0.0, width, kHeight});
   return canvas.image();
 }
 }  // namespace
 
 cv::Mat plot_trajectory_errors(const Trajectory& truth, const std::vector<NamedTrajectoryError>& estimates,
                                WorldUp up) {
-  if (truth.empty()) throw InputError("a trajectory without poses cannot be drawn");
-  return side_by_side(paths_plot(truth, estimates, choose_view(truth, up)), errors_plot(truth, estimates));
+  const bool drawable = std::all_of(estimates.begin(), estimates.end(),
+                                    [](const NamedTrajectoryError& e) { return !e.error.poses.empty(); });
+  if (truth.empty() || !drawable) throw InputError("a trajectory without poses cannot be drawn");
+  return side_by_side(paths_plot(truth, estimates, up), errors_plot(estimates));
 }
 
 cv::Mat plot_trajectory(const Trajectory& trajectory, const std::string& name, WorldUp up) {
@@ -181,7 +190,7 @@ cv::Mat plot_trajectory(const Trajectory& trajectory, const std::string& name, W
   const cv::Point2d first = points.front();
   const cv::Point2d last = points.back();
 
-  Plot map("Trajectory from above");
+  Plot map(map_title(view, up));
   map.set_equal_aspect();
   map.set_labels(axis_label(view.right), axis_label(view.up));
   map.add_coloured_line(std::move(points), std::move(values), "time [s]", name);
@@ -197,7 +206,7 @@ cv::Mat plot_trajectory(const Trajectory& trajectory, const std::string& name, W
   const std::string label = axis_label(view.height, view.height_sign);
   Plot height(up == WorldUp::kUnknown ? "Third axis over time" : "Height over time");
   height.set_labels("time [s]", up == WorldUp::kUnknown ? label : "height " + label);
-  height.add_line(interrupted(times, heights, times).points, {line_colour(0), 1.8});
+  height.add_line(interrupted(times, heights, times).points, line_style(0));
   return side_by_side(map, height);
 }
 

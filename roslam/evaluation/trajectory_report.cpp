@@ -70,7 +70,8 @@ double median_of(const std::vector<EvaluatedTrajectory>& runs, const Value& valu
 }
 
 std::string escaped(std::string name) {
-  for (auto at = name.find('|'); at != std::string::npos; at = name.find('|', at + 2)) name.insert(at, 1, '\\');
+  for (auto at = name.find('|'); at != std::string::npos; at = name.find('|', at + 2))
+    name.insert(at, 1, '\\');
   return name;
 }
 
