@@ -132,20 +132,21 @@ TEST_F(EvaluateTrajectory, ExitsWithOneAndOneLineOnBadInput) {
   std::ofstream(folder_ / "two.txt") << "0 0 0 0 0 0 0 1\n0.1 0 0 0 0 0 0 1\n";
   const std::string truth = "trajectory --truth sequence --estimate ";
   for (const auto& [arguments, words] : std::vector<std::pair<std::string, std::string>>{
-    {truth + "missing.txt", "missing.txt"}, {truth + "sequence", "no trajectory.txt"},
-        {truth + "broken.txt", "broken.txt:1:"}, {truth + "two.txt", "only 2 poses"},
-        {truth + "late.txt", "1000.000 to 1007.900 s"}, {truth + "run-1 --against late.txt", "late.txt"},
-        {"trajectory --truth . --estimate run-1", "groundtruth.txt"},
-        {truth + "run-1 --plot no/such/folder/figure.png", "folder"}, {
-      truth + "run-1 --plot figure.xyz", ".png"
-    }}
-}) {
-  const auto result = run(arguments);
-  EXPECT_EQ(result.code, 1) << arguments;
-  EXPECT_NE(result.error.find(words), std::string::npos) << arguments << " -> " << result.error;
-  EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
-  EXPECT_EQ(result.out, "") << arguments;
-}
+           {truth + "missing.txt", "missing.txt"},
+           {truth + "sequence", "no trajectory.txt"},
+           {truth + "broken.txt", "broken.txt:1:"},
+           {truth + "two.txt", "only 2 poses"},
+           {truth + "late.txt", "1000.000 to 1007.900 s"},
+           {truth + "run-1 --against late.txt", "late.txt"},
+           {"trajectory --truth . --estimate run-1", "groundtruth.txt"},
+           {truth + "run-1 --plot no/such/folder/figure.png", "folder"},
+           {truth + "run-1 --plot figure.xyz", ".png"}}) {
+    const auto result = run(arguments);
+    EXPECT_EQ(result.code, 1) << arguments;
+    EXPECT_NE(result.error.find(words), std::string::npos) << arguments << " -> " << result.error;
+    EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
+    EXPECT_EQ(result.out, "") << arguments;
+  }
 }
 
 TEST_F(EvaluateTrajectory, ExitsWithOneIfTheReportCannotBeWritten) {
