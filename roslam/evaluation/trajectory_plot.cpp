@@ -41,10 +41,10 @@ View choose_view(const Trajectory& trajectory, WorldUp up) {
     low = low.cwiseMin(pose.T_world_camera.translation());
     high = high.cwiseMax(pose.T_world_camera.translation());
   }
-  Eigen::Index shortest = 0;
-  (high - low).minCoeff(&shortest);
-  if (shortest == 0) return {1, 2, 0, 1.0};
-  if (shortest == 1) return {0, 2, 1, 1.0};
+  const Eigen::Vector3d extent = high - low;
+  // Of equal extents z is left out first: most worlds are drawn with z up.
+  if (extent.x() < extent.y() && extent.x() < extent.z()) return {1, 2, 0, 1.0};
+  if (extent.y() < extent.z()) return {0, 2, 1, 1.0};
   return {0, 1, 2, 1.0};
 }
 
