@@ -81,6 +81,7 @@ Named parse_named(const std::string& argument) {
 
 std::vector<Named> parse_all(const std::vector<std::string>& arguments) {
   std::vector<Named> all;
+  all.reserve(arguments.size());
   for (const auto& argument : arguments) all.push_back(parse_named(argument));
   return all;
 }

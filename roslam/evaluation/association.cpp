@@ -60,6 +60,7 @@ std::vector<PosePair> nearest_pairs(const Trajectory& truth, const Trajectory& e
     truth_of.emplace_hint(next, candidate.estimate, candidate.truth);
   }
   std::vector<PosePair> pairs;
+  pairs.reserve(truth_of.size());
   for (const auto& [e, t] : truth_of) pairs.push_back({truth[t], estimate[e]});
   return pairs;
 }

@@ -66,6 +66,7 @@ void Canvas::line(const std::vector<cv::Point2d>& points, const LineStyle& style
   cv::Mat view = drawing_(clip_);
   for (const auto& piece : style.dashed ? dashes(points) : std::vector<std::vector<cv::Point2d>>{points}) {
     std::vector<cv::Point> fixed;
+    fixed.reserve(piece.size());
     for (const auto& point : piece) fixed.push_back(fixed_point(point, clip_.tl()));
     cv::polylines(view, fixed, false, style.colour, width, cv::LINE_AA, kFractionBits);
   }

@@ -192,8 +192,9 @@ void Plot::draw_legend(Canvas& canvas, const cv::Rect2d& area) const {
     } else if (line->values.empty()) {
       canvas.line({at, end}, line->style);
     } else {
-      for (double x = at.x; x < end.x; x += 1.0) {
-        canvas.rectangle({x, at.y - 2.0, 1.0, 4.0}, scale_colour((x - at.x) / (end.x - at.x)));
+      const double width = end.x - at.x;
+      for (int x = 0; x < width; ++x) {
+        canvas.rectangle({at.x + x, at.y - 2.0, 1.0, 4.0}, scale_colour(x / width));
       }
     }
     canvas.text(words, at + cv::Point2d(kLegendSample, 0.0), kTickSize, Anchor::kLeft);
@@ -260,7 +261,7 @@ void Plot::draw_colour_bar(Canvas& canvas, const Axes& axes) const {
   const Range values = value_range();
   const cv::Rect2d bar(axes.box.x + axes.box.width + 12.0, axes.box.y, kBarWidth, axes.box.height);
   const double bottom = bar.y + bar.height;
-  for (double y = 0.0; y < bar.height; y += 1.0) {
+  for (int y = 0; y < bar.height; ++y) {
     const double height = std::min(1.0, bar.height - y);
     canvas.rectangle({bar.x, bottom - y - height, bar.width, height}, scale_colour(y / bar.height));
   }

@@ -33,7 +33,11 @@ std::vector<double> nice_ticks(const Range& range, int max_count) {
       const double last = std::floor(range.max / step + kSlack);
       if (last - first + 1.0 > std::max(1, max_count)) continue;
       std::vector<double> ticks;
-      for (double i = first; i <= last; i += 1.0) ticks.push_back(i == 0.0 ? 0.0 : i * step);
+      const int count = static_cast<int>(last - first) + 1;
+      for (int i = 0; i < count; ++i) {
+        const double multiple = first + i;
+        ticks.push_back(multiple == 0.0 ? 0.0 : multiple * step);  // 0.0: never minus zero
+      }
       return ticks;
     }
   }

@@ -54,6 +54,7 @@ void require_pairs(const std::vector<PosePair>& pairs, const Trajectory& truth, 
 
 std::vector<double> times_of(const std::vector<PosePair>& pairs) {
   std::vector<double> times;
+  times.reserve(pairs.size());
   for (const auto& pair : pairs) times.push_back(pair.estimate.timestamp);
   return times;
 }
