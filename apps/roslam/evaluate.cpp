@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/evaluate.hpp"
+
 #include "apps/roslam/commands.hpp"
 
 namespace roslam::app {
 
-void add_evaluate_command(CLI::App&) {}
+void add_evaluate_command(CLI::App& program) {
+  auto* evaluate = program.add_subcommand("evaluate", "Measure a result against a known truth.");
+  evaluate->require_subcommand(1);
+  add_evaluate_trajectory_command(*evaluate);
+}
 
 }  // namespace roslam::app

@@ -51,13 +51,16 @@ std::vector<PosePair> nearest_pairs(const Trajectory& truth, const Trajectory& e
   });
   std::map<std::size_t, std::size_t> truth_of;  // by estimate; both strictly increasing
   for (const auto& candidate : candidates) {
-    // Between the truths of its neighbours: that keeps each truth to one pair and time running forwards in both.
+    // Between the truths of its neighbours: that keeps each truth to one pair and time running forwards in
+    // both.
     const auto next = truth_of.lower_bound(candidate.estimate);
-    if (next != truth_of.end() && (next->first == candidate.estimate || next->second <= candidate.truth)) continue;
+    if (next != truth_of.end() && (next->first == candidate.estimate || next->second <= candidate.truth))
+      continue;
     if (next != truth_of.begin() && std::prev(next)->second >= candidate.truth) continue;
     truth_of.emplace_hint(next, candidate.estimate, candidate.truth);
   }
   std::vector<PosePair> pairs;
+  pairs.reserve(truth_of.size());
   for (const auto& [e, t] : truth_of) pairs.push_back({truth[t], estimate[e]});
   return pairs;
 }

@@ -15,9 +15,18 @@ namespace roslam {
 namespace {
 constexpr std::size_t kMinPairs = 3;
 constexpr double kGapInMedianSteps = 3.0;
-// How far from the wanted span a pair of poses may be, as a share of it: half a frame at 5 Hz for one second.
+// How far from the wanted span a pair of poses may be: half a step (more would let the last poses take a
+// partner too near for want of a later one), and never more than this share of the span.
+constexpr double kStepTolerance = 0.5;
 constexpr double kSpanTolerance = 0.1;
+constexpr double kTimeRounding = 1e-6;  // seconds
 constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+double median_step(const std::vector<double>& timestamps) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < timestamps.size(); ++i) steps.push_back(timestamps[i] - timestamps[i - 1]);
+  return median(std::move(steps));
+}
 
 std::string seconds(double value) {
   char text[64];
@@ -45,11 +54,13 @@ void require_pairs(const std::vector<PosePair>& pairs, const Trajectory& truth, 
 
 std::vector<double> times_of(const std::vector<PosePair>& pairs) {
   std::vector<double> times;
+  times.reserve(pairs.size());
   for (const auto& pair : pairs) times.push_back(pair.estimate.timestamp);
   return times;
 }
 
-// The truth may be at a higher rate than the pairs: its own poses between theirs follow the path more closely.
+// The truth may be at a higher rate than the pairs: its own poses between theirs follow the path more
+// closely.
 double path_length(const Trajectory& truth, const StampedPose& from, const StampedPose& to) {
   double length = 0.0;
   Eigen::Vector3d last = from.T_world_camera.translation();
@@ -107,6 +118,8 @@ RelativeError error_per_frame(const std::vector<PosePair>& pairs, const std::vec
 RelativeError error_over_span(const std::vector<PosePair>& pairs, const std::vector<double>& times,
                               double span, double scale) {
   RelativeErrors errors(pairs, scale);
+  const double half_step = kStepTolerance * median_step(times);
+  const double tolerance = std::min(half_step, kSpanTolerance * span) + kTimeRounding;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const double wanted = times[i] + span;
     auto after = std::lower_bound(times.begin(), times.end(), wanted);
@@ -114,7 +127,7 @@ RelativeError error_over_span(const std::vector<PosePair>& pairs, const std::vec
       --after;
     }
     const auto j = static_cast<std::size_t>(std::distance(times.begin(), after));
-    if (j > i && std::abs(times[j] - wanted) <= kSpanTolerance * span) errors.add(i, j);
+    if (j > i && std::abs(times[j] - wanted) <= tolerance) errors.add(i, j);
   }
   return errors.summary();
 }
@@ -142,9 +155,7 @@ void TrajectoryErrorOptions::validate() const {
 }
 
 double longest_step(const std::vector<double>& timestamps) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < timestamps.size(); ++i) steps.push_back(timestamps[i] - timestamps[i - 1]);
-  return kGapInMedianSteps * median(std::move(steps));
+  return kGapInMedianSteps * median_step(timestamps);
 }
 
 TrajectoryError evaluate_trajectory(const Trajectory& truth, const Trajectory& estimate,

@@ -146,7 +146,8 @@ std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyram
       point.angle = orientation(pyramid[level], point.pt, circle_);
       point.octave = static_cast<int>(level);
       point.size = static_cast<float>(2 * kPatchRadius + 1) * scale;
-      point.pt *= scale;
+      // Pixel centres, not corners, of a level lie on a grid of the full image.
+      point.pt = (point.pt + cv::Point2f(0.5F, 0.5F)) * scale - cv::Point2f(0.5F, 0.5F);
       all.push_back(point);
     }
   }

@@ -84,9 +84,11 @@ void append_number(std::string& text, double value, int decimals) {
 
 // q and -q are one rotation: the one with w >= 0 is written.
 Eigen::Vector4d canonical_coefficients(const Eigen::Quaterniond& q) {
-  const Eigen::Vector4d xyzw = q.coeffs();
+  Eigen::Vector4d xyzw = q.coeffs();
   for (const int i : {3, 0, 1, 2}) {
-    if (xyzw[i] != 0.0) return xyzw[i] < 0.0 ? Eigen::Vector4d(-xyzw) : xyzw;
+    if (xyzw[i] == 0.0) continue;
+    if (xyzw[i] < 0.0) xyzw = -xyzw;
+    break;
   }
   return xyzw;
 }

@@ -106,7 +106,7 @@ std::vector<bool> bundle_inliers(const Camera& camera, const BundleProblem& prob
   for (const auto& term : problem.terms) {
     const Eigen::Vector3d point = problem.poses[term.pose].T_camera_world * problem.points[term.point];
     const ReprojectionError error{camera, term.measurement};
-    result.push_back(point.z() > 0.0 && error.error(point).squaredNorm() <= chi_squared_limit(term.measurement));
+    result.push_back(point.z() > 0.0 && error.error(point).squaredNorm() <= outlier_limit(term.measurement));
   }
   return result;
 }

@@ -73,7 +73,7 @@ class Fuser {
     const Measurement measurement =
         Measurement::make(view.pixels[point], view.depths[point], map_.scale(view.levels[point]), noise_);
     const Eigen::Vector3d in_camera = keyframe.T_camera_world * landmark.position;
-    return ReprojectionError{camera_, measurement}.error(in_camera).squaredNorm() <= chi_squared_limit(measurement);
+    return ReprojectionError{camera_, measurement}.error(in_camera).squaredNorm() <= outlier_limit(measurement);
   }
 
   // True if two landmarks became one.

@@ -21,7 +21,7 @@ bool fits(const Map& map, const Keyframe& keyframe, std::uint32_t point, const E
   const Eigen::Vector3d in_camera = keyframe.T_camera_world * position;
   if (in_camera.z() <= 0.0) return false;
   const Measurement measurement = measurement_of(map, keyframe, point, noise);
-  return ReprojectionError{camera, measurement}.error(in_camera).squaredNorm() <= chi_squared_limit(measurement);
+  return ReprojectionError{camera, measurement}.error(in_camera).squaredNorm() <= outlier_limit(measurement);
 }
 
 // Points of a keyframe that show no landmark.

@@ -21,6 +21,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("noise", "pixel_sigma", o.noise.pixel_sigma);
   visit("noise", "depth_sigma", o.noise.depth_sigma);
   visit("noise", "depth_sigma_growth", o.noise.depth_sigma_growth);
+  visit("noise", "outlier_factor", o.noise.outlier_factor);
   visit("matcher", "max_distance", o.matcher.max_distance);
   visit("matcher", "strict_distance", o.matcher.strict_distance);
   visit("matcher", "ratio", o.matcher.ratio);

@@ -8,16 +8,11 @@
 namespace roslam {
 
 namespace {
-// Landmarks of a keyframe that are confirmed by others (or all of them while the map is young).
-int confirmed_landmarks(const Map& map, KeyframeId id) {
+int landmarks_of(const Map& map, KeyframeId id) {
   const Keyframe* keyframe = map.find(id);
   if (keyframe == nullptr) return 0;
-  const std::size_t needed = map.keyframe_count() <= 2 ? 2 : 3;
-  int count = 0;
-  for (const LandmarkId landmark : keyframe->landmarks) {
-    if (landmark.is_valid() && map.find(landmark)->observations.size() >= needed) ++count;
-  }
-  return count;
+  return static_cast<int>(std::count_if(keyframe->landmarks.begin(), keyframe->landmarks.end(),
+                                        [](LandmarkId landmark) { return landmark.is_valid(); }));
 }
 }  // namespace
 
@@ -49,7 +44,7 @@ bool KeyframePolicy::promotes(const TrackedFrame& frame, const Map& map, bool ma
     ++(frame.landmarks[i].is_valid() ? tracked_near : new_near);
   }
   const bool needs_near = tracked_near < options_.min_tracked_near && new_near > options_.min_new_near;
-  const int reference = confirmed_landmarks(map, frame.reference);
+  const int reference = landmarks_of(map, frame.reference);
   const bool little_overlap = frame.inliers < options_.min_overlap * reference;
   const bool weak = frame.inliers < 0.25 * reference || needs_near;
   const bool due = elapsed >= options_.max_interval;

@@ -61,7 +61,7 @@ OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurem
       const Eigen::Vector3d point = result.T_camera_world * measurements[i].point_world;
       const ReprojectionError term{camera, measurements[i].measurement};
       result.is_inlier[i] =
-          point.z() > kMinDepth && term.error(point).squaredNorm() <= chi_squared_limit(measurements[i].measurement);
+          point.z() > kMinDepth && term.error(point).squaredNorm() <= outlier_limit(measurements[i].measurement);
       result.inliers += result.is_inlier[i] ? 1 : 0;
     }
   }

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace roslam::app {
+
+// Each adds one kind of evaluation to `roslam evaluate`; a file of its own holds each.
+void add_evaluate_trajectory_command(CLI::App& evaluate);
+
+}  // namespace roslam::app

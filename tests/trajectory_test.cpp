@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/geometry/trajectory.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <random>
+#include <sstream>
+
+#include "roslam/error.hpp"
+#include "roslam/geometry/alignment.hpp"
+
+namespace roslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string content(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+class TrajectoryText : public testing::Test {
+ protected:
+  // CTest runs cases side by side: each has a file of its own.
+  const fs::path file_ =
+      fs::path(testing::TempDir()) /
+      (std::string("trajectory_") + testing::UnitTest::GetInstance()->current_test_info()->name() + ".txt");
+
+  TrajectoryFile read(const std::string& text) const {
+    std::ofstream(file_, std::ios::binary) << text;
+    return read_trajectory(file_);
+  }
+
+  void TearDown() override { fs::remove(file_); }
+
+  std::string refusal(const std::string& text) const {
+    try {
+      read(text);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+};
+
+TEST_F(TrajectoryText, ReadsNumbersInTheOrderOfTheFormat) {
+  const auto read_file = read("1.5 1 2 3 0 0 0.6 0.8\n");
+  ASSERT_EQ(read_file.trajectory.size(), 1u);
+  EXPECT_EQ(read_file.skipped, 0u);
+  const auto& [time, pose] = read_file.trajectory[0];
+  EXPECT_EQ(time, 1.5);
+  EXPECT_EQ(pose.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_NEAR(pose.rotation().z(), 0.6, 1e-15);
+  EXPECT_NEAR(pose.rotation().w(), 0.8, 1e-15);
+}
+
+TEST_F(TrajectoryText, ToleratesCommentsBlankLinesCommasAndWindowsLineEnds) {
+  const auto read_file = read(
+      "# a comment\r\n"
+      "\r\n"
+      "   \t \n"
+      "  1,1,2,3,0,0,0,1\r\n"
+      "2\t 1e0  +2 3.0 0 0 0 1   # remark\n"
+      "3, 1, 2, 3, 0, 0, 0, 1\n"
+      "  # indented comment\n"
+      "4 1 2 3 0 0 0 1");  // no line end at the end
+  EXPECT_EQ(read_file.trajectory.size(), 4u);
+  EXPECT_EQ(read_file.skipped, 0u);
+  for (const auto& pose : read_file.trajectory) {
+    EXPECT_EQ(pose.T_world_camera.translation(), Eigen::Vector3d(1, 2, 3));
+  }
+}
+
+TEST_F(TrajectoryText, NamesFileAndLineOfWhatIsNotEightNumbers) {
+  for (const std::string line : {"2 1 2 3 0 0 0", "2 1 2 3 0 0 0 1 9", "2 1 2 3 0 0 0 one",
+                                 "2 1 2 3 0 0 0 1x", "2 1 2 3 0 0 0 --1", "2 1 2 3 0 0 0 +-1", "hello"}) {
+    const std::string message = refusal("# head\n1 0 0 0 0 0 0 1\n" + line + "\n");
+    EXPECT_NE(message.find(file_.string() + ":3:"), std::string::npos) << line << " -> " << message;
+  }
+}
+
+TEST_F(TrajectoryText, SkipsAndCountsValuesThatAreNotFinite) {
+  const auto read_file = read(
+      "1 0 0 0 0 0 0 1\n"
+      "2 nan 0 0 0 0 0 1\n"
+      "3 0 -inf 0 0 0 0 1\n"
+      "4 0 0 0 NaN NaN NaN NaN\n"
+      "nan 0 0 0 0 0 0 1\n"
+      "5 1e999 0 0 0 0 0 1\n"
+      "6 0 0 0 0 0 0 1\n");
+  EXPECT_EQ(read_file.trajectory.size(), 2u);
+  EXPECT_EQ(read_file.skipped, 5u);
+}
+
+TEST_F(TrajectoryText, NormalisesNearlyUnitQuaternionsAndSkipsOthers) {
+  const auto read_file = read(
+      "1 0 0 0 0 0 0 0.91\n"
+      "2 0 0 0 0 0 0 1.09\n"
+      "3 0 0 0 0 0 0 0.89\n"
+      "4 0 0 0 0 0 0 1.11\n"
+      "5 0 0 0 0 0 0 0\n"
+      "6 0 0 0 0 0 0.63 0.84\n");  // 1.05 times (0.6, 0.8)
+  ASSERT_EQ(read_file.trajectory.size(), 3u);
+  EXPECT_EQ(read_file.skipped, 3u);
+  for (const auto& pose : read_file.trajectory)
+    EXPECT_NEAR(pose.T_world_camera.rotation().norm(), 1.0, 1e-15);
+  EXPECT_NEAR(read_file.trajectory[2].T_world_camera.rotation().z(), 0.6, 1e-12);
+}
+
+TEST_F(TrajectoryText, SortsByTimeAndKeepsTheFirstOfRepeatedTimes) {
+  const auto read_file = read(
+      "3 3 0 0 0 0 0 1\n"
+      "1 1 0 0 0 0 0 1\n"
+      "2 2 0 0 0 0 0 1\n"
+      "1 9 0 0 0 0 0 1\n"
+      "3.0 9 0 0 0 0 0 1\n");
+  ASSERT_EQ(read_file.trajectory.size(), 3u);
+  EXPECT_EQ(read_file.skipped, 2u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(read_file.trajectory[i].timestamp, static_cast<double>(i + 1));
+    EXPECT_EQ(read_file.trajectory[i].T_world_camera.translation().x(), static_cast<double>(i + 1));
+  }
+}
+
+TEST_F(TrajectoryText, RefusesWhatHoldsNoPose) {
+  EXPECT_NE(refusal("").find("no pose"), std::string::npos);
+  EXPECT_NE(refusal("# only a comment\n").find("no pose"), std::string::npos);
+  EXPECT_NE(refusal("1 nan 0 0 0 0 0 1\n").find("no pose"), std::string::npos);
+  EXPECT_THROW(read_trajectory("/no/such/file.txt"), InputError);
+  EXPECT_THROW(read_trajectory(testing::TempDir()), InputError);
+}
+
+TEST_F(TrajectoryText, RoundTripsToTheWrittenDecimals) {
+  std::mt19937 generator(3);
+  std::normal_distribution<double> normal;
+  Trajectory trajectory;
+  for (int i = 0; i < 100; ++i) {
+    Vector6d tangent;
+    for (int k = 0; k < 6; ++k) tangent[k] = normal(generator);
+    trajectory.push_back({1305031229.0 + 0.033 * i, SE3::exp(tangent)});
+  }
+  write_trajectory(file_, trajectory);
+  const auto read_file = read_trajectory(file_);
+  ASSERT_EQ(read_file.trajectory.size(), trajectory.size());
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    const auto& pose = read_file.trajectory[i];
+    EXPECT_NEAR(pose.timestamp, trajectory[i].timestamp, 6e-7);
+    EXPECT_LT((pose.T_world_camera.inverse() * trajectory[i].T_world_camera).log().norm(), 1e-8);
+  }
+  const std::string first = content(file_);
+  write_trajectory(file_, trajectory);
+  EXPECT_EQ(content(file_), first);
+}
+
+TEST_F(TrajectoryText, WritesTheSameBytesForTheSamePose) {
+  const Eigen::Quaterniond q(-0.8, 0.0, 0.0, -0.6);
+  write_trajectory(file_, {{1.0, SE3(q, {-1e-15, 0.25, -2.0})}});
+  EXPECT_EQ(
+      content(file_),
+      "# timestamp tx ty tz qx qy qz qw\n"
+      "1.000000 0.000000000 0.250000000 -2.000000000 0.000000000 0.000000000 0.600000000 0.800000000\n");
+}
+
+TEST_F(TrajectoryText, ReportsAFullDiskAndAMissingFolder) {
+  const Trajectory trajectory{{1.0, SE3()}};
+  if (fs::exists("/dev/full")) {
+    EXPECT_THROW(write_trajectory("/dev/full", trajectory), OutputError);
+  }
+  EXPECT_THROW(write_trajectory("/no/such/folder/t.txt", trajectory), OutputError);
+  EXPECT_THROW(write_trajectory(testing::TempDir(), trajectory), OutputError);
+}
+
+using Points = std::vector<Eigen::Vector3d>;
+
+Points random_points(std::mt19937& generator, std::size_t count) {
+  std::normal_distribution<double> normal;
+  Points points;
+  for (std::size_t i = 0; i < count; ++i)
+    points.emplace_back(normal(generator), 2 * normal(generator), normal(generator));
+  return points;
+}
+
+double cost(const Alignment& alignment, const Points& source, const Points& target) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < source.size(); ++i) sum += (alignment * source[i] - target[i]).squaredNorm();
+  return sum;
+}
+
+Eigen::Vector3d mean(const Points& points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const auto& point : points) sum += point;
+  return sum / static_cast<double>(points.size());
+}
+
+// Horn 1987: the rotation is the eigenvector of a 4x4 matrix, found without any singular value decomposition.
+Alignment horn(const Points& source, const Points& target, bool with_scale) {
+  const Eigen::Vector3d from = mean(source);
+  const Eigen::Vector3d to = mean(target);
+  Eigen::Matrix3d s = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < source.size(); ++i) s += (source[i] - from) * (target[i] - to).transpose();
+  Eigen::Matrix4d n;
+  n << s(0, 0) + s(1, 1) + s(2, 2), s(1, 2) - s(2, 1), s(2, 0) - s(0, 2), s(0, 1) - s(1, 0),  //
+      s(1, 2) - s(2, 1), s(0, 0) - s(1, 1) - s(2, 2), s(0, 1) + s(1, 0), s(2, 0) + s(0, 2),   //
+      s(2, 0) - s(0, 2), s(0, 1) + s(1, 0), -s(0, 0) + s(1, 1) - s(2, 2), s(1, 2) + s(2, 1),  //
+      s(0, 1) - s(1, 0), s(2, 0) + s(0, 2), s(1, 2) + s(2, 1), -s(0, 0) - s(1, 1) + s(2, 2);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(n);
+  const Eigen::Vector4d q = solver.eigenvectors().col(3);
+  const Eigen::Quaterniond rotation(q[0], q[1], q[2], q[3]);
+  double scale = 1.0;
+  if (with_scale) {
+    double across = 0.0;
+    double spread = 0.0;
+    for (std::size_t i = 0; i < source.size(); ++i) {
+      across += (target[i] - to).dot(rotation * (source[i] - from));
+      spread += (source[i] - from).squaredNorm();
+    }
+    scale = across / spread;
+  }
+  return {scale, SE3(rotation, to - scale * (rotation * from)), true};
+}
+
+TEST(Alignment, AgreesWithHornsQuaternionMethodOnNoisyPoints) {
+  std::mt19937 generator(5);
+  std::normal_distribution<double> normal(0.0, 0.3);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Points source = random_points(generator, 3 + static_cast<std::size_t>(trial));
+    Vector6d tangent;
+    for (int k = 0; k < 6; ++k) tangent[k] = 5.0 * normal(generator);
+    Points target;
+    for (const auto& point : source) {
+      target.push_back(SE3::exp(tangent) * (1.7 * point) +
+                       Eigen::Vector3d(normal(generator), normal(generator), normal(generator)));
+    }
+    for (const auto model : {AlignmentModel::kRigid, AlignmentModel::kSimilarity}) {
+      const auto found = align(source, target, model);
+      const Alignment expected = horn(source, target, model == AlignmentModel::kSimilarity);
+      ASSERT_TRUE(found);
+      EXPECT_TRUE(found->unique_rotation);
+      EXPECT_NEAR(found->scale, expected.scale, 1e-9);
+      EXPECT_LT((found->T_target_source.matrix() - expected.T_target_source.matrix()).norm(), 1e-8);
+    }
+  }
+}
+
+TEST(Alignment, NoSmallChangeIsBetter) {
+  std::mt19937 generator(6);
+  const Points source = random_points(generator, 12);
+  const Points target = random_points(generator, 12);  // unrelated: a reflection would often fit better
+  const auto found = align(source, target, AlignmentModel::kSimilarity);
+  ASSERT_TRUE(found);
+  const double least = cost(*found, source, target);
+  for (int k = 0; k < 7; ++k) {
+    for (const double step : {-1e-3, 1e-3}) {
+      Alignment changed = *found;
+      Vector6d tangent = Vector6d::Zero();
+      if (k < 6) tangent[k] = step;
+      if (k == 6) changed.scale += step;
+      changed.T_target_source = changed.T_target_source * SE3::exp(tangent);
+      EXPECT_GT(cost(changed, source, target), least) << k;
+    }
+  }
+  EXPECT_NEAR(found->T_target_source.rotation().toRotationMatrix().determinant(), 1.0, 1e-12);
+}
+
+TEST(Alignment, FitsAStraightLineAndAHoverThoughNotUniquely) {
+  const Points line{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {5, 0, 0}};
+  const Points turned{{1, 1, 1}, {1, 2, 1}, {1, 3, 1}, {1, 6, 1}};
+  const auto found = align(line, turned, AlignmentModel::kRigid);
+  ASSERT_TRUE(found);
+  EXPECT_FALSE(found->unique_rotation);
+  EXPECT_LT(cost(*found, line, turned), 1e-20);
+
+  const Points spot(4, Eigen::Vector3d(7, 8, 9));
+  const auto hover = align(spot, turned, AlignmentModel::kRigid);
+  ASSERT_TRUE(hover);
+  EXPECT_FALSE(hover->unique_rotation);
+  EXPECT_LT((*hover * spot[0] - mean(turned)).norm(), 1e-12);
+  EXPECT_FALSE(align(spot, turned, AlignmentModel::kSimilarity));
+  EXPECT_FALSE(align(turned, spot, AlignmentModel::kSimilarity));
+}
+
+TEST(Alignment, HasNoAnswerForTooFewUnequalOrUnusablePoints) {
+  const Points two{{0, 0, 0}, {1, 0, 0}};
+  const Points three{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  Points unusable = three;
+  unusable[1].y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(align(two, two, AlignmentModel::kRigid));
+  EXPECT_FALSE(align(two, three, AlignmentModel::kRigid));
+  EXPECT_FALSE(align(three, unusable, AlignmentModel::kRigid));
+  EXPECT_FALSE(align({}, {}, AlignmentModel::kRigid));
+}
+
+}  // namespace
+}  // namespace roslam
