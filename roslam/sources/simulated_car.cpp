@@ -162,7 +162,7 @@ void add_wheels(MeshBuilder& builder, const CarShape& car, const Surface& paint)
                    .instance = paint.instance,
                    .seed = 2,
                    .colour = {0.1F, 0.1F, 0.1F}});
-      for (int spoke = 0; spoke < 5; ++spoke) {
+      for (int spoke = 0; spoke < 5 && builder.detail() > 0.55F; ++spoke) {
         const float angle = 1.2566F * static_cast<float>(spoke) + x;
         const Vector3f hole(x + 0.11F * std::cos(angle), y + side * 0.1F, kRadius + 0.11F * std::sin(angle));
         builder.ellipsoid(hole, {0.045F, 0.035F, 0.045F}, 4, 6);

@@ -34,6 +34,7 @@ void add_ground(MeshBuilder& builder, const CityPlan& plan) {
 }
 
 void add_pavement(MeshBuilder& builder, const CityPlan& plan, const Vector2f& low, const Vector2f& high) {
+  builder.place(Vector3f::Zero(), 0);
   const float z = plan.kerb_height;
   const float rim = 0.18F;  // kerb stones
   builder.use({.material = Material::kPavement, .label = kSidewalkLabel});
@@ -50,6 +51,7 @@ void add_pavement(MeshBuilder& builder, const CityPlan& plan, const Vector2f& lo
 // A green square with a low wall, in the place of a house.
 void add_garden(MeshBuilder& builder, const CityPlan& plan, const Vector2f& low, const Vector2f& high,
                 Dice& dice) {
+  builder.place(Vector3f::Zero(), 0);
   const float z = plan.kerb_height + 0.05F;
   builder.use({.material = Material::kGrass, .label = kTerrainLabel, .seed = dice.bits()});
   builder.quad({low.x(), low.y(), z}, {high.x(), low.y(), z}, {high.x(), high.y(), z}, {low.x(), high.y(), z},

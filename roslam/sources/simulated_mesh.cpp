@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/sources/simulated_mesh.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -36,6 +37,10 @@ std::uint32_t MeshBuilder::vertex(const Vector3f& position, const Vector3f& norm
 void MeshBuilder::face(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
   mesh_.triangles.push_back({a, b, c});
   mesh_.surface_of.push_back(static_cast<std::uint32_t>(mesh_.surfaces.size() - 1));
+}
+
+int MeshBuilder::divisions(int in_full) const {
+  return std::max(std::min(in_full, 4), static_cast<int>(std::lround(static_cast<float>(in_full) * detail_)));
 }
 
 void MeshBuilder::quad(const Vector3f& a, const Vector3f& b, const Vector3f& c, const Vector3f& d,
@@ -76,7 +81,8 @@ void MeshBuilder::box(const Vector3f& low, const Vector3f& high) {
 }
 
 void MeshBuilder::tube(const Vector3f& from, const Vector3f& to, float radius_from, float radius_to,
-                       int sides, float flatness) {
+                       int sides_in_full, float flatness) {
+  const int sides = divisions(sides_in_full);
   const Vector3f axis = to - from;
   const float length = axis.norm();
   const Vector3f w = axis / std::max(length, 1e-6F);
@@ -104,8 +110,10 @@ void MeshBuilder::tube(const Vector3f& from, const Vector3f& to, float radius_fr
   }
 }
 
-void MeshBuilder::ellipsoid(const Vector3f& centre, const Vector3f& radii, int rings, int sides,
-                            float roughness, std::uint32_t seed) {
+void MeshBuilder::ellipsoid(const Vector3f& centre, const Vector3f& radii, int rings_in_full,
+                            int sides_in_full, float roughness, std::uint32_t seed) {
+  const int rings = divisions(rings_in_full);
+  const int sides = divisions(sides_in_full);
   const auto first = static_cast<std::uint32_t>(mesh_.positions.size());
   const float girth = kTurn * 0.5F * (radii.x() + radii.y());
   for (int j = 0; j <= rings; ++j) {

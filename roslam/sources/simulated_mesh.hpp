@@ -78,6 +78,10 @@ class MeshBuilder {
   /// What is added from now on is made of this.
   void use(const Surface& surface);
 
+  /// How finely round things are divided from now on: 1 is in full, for what is near.
+  void set_detail(float detail) { detail_ = detail; }
+  float detail() const { return detail_; }
+
   /// Corners anticlockwise as seen from outside.
   void quad(const Vector3f& a, const Vector3f& b, const Vector3f& c, const Vector3f& d, const Vector2f& uv_a,
             const Vector2f& uv_c);
@@ -87,10 +91,10 @@ class MeshBuilder {
                 const Vector2f& uv_b, const Vector2f& uv_c);
   void box(const Vector3f& low, const Vector3f& high);
   /// A tube that tapers from one radius to the other, its ends closed.
-  void tube(const Vector3f& from, const Vector3f& to, float radius_from, float radius_to, int sides,
+  void tube(const Vector3f& from, const Vector3f& to, float radius_from, float radius_to, int sides_in_full,
             float flatness = 1.0F);
-  void ellipsoid(const Vector3f& centre, const Vector3f& radii, int rings, int sides, float roughness = 0.0F,
-                 std::uint32_t seed = 0);
+  void ellipsoid(const Vector3f& centre, const Vector3f& radii, int rings_in_full, int sides_in_full,
+                 float roughness = 0.0F, std::uint32_t seed = 0);
   /// A closed strip of rings, each with the same number of points; smooth across, texture from positions (x,
   /// z).
   void loft(const std::vector<std::vector<Vector3f>>& rings);
@@ -98,9 +102,11 @@ class MeshBuilder {
  private:
   std::uint32_t vertex(const Vector3f& position, const Vector3f& normal, const Vector2f& uv);
   void face(std::uint32_t a, std::uint32_t b, std::uint32_t c);
+  int divisions(int in_full) const;
 
   Mesh& mesh_;
   Eigen::Isometry3f T_world_local_ = Eigen::Isometry3f::Identity();
+  float detail_ = 1.0F;
 };
 
 }  // namespace roslam::simulation

@@ -16,8 +16,8 @@ std::uint32_t cell(int i) { return static_cast<std::uint32_t>(i); }
 
 // Smooth noise in [-1, 1] that repeats after `period` cells.
 float periodic_noise(float x, float y, int period, std::uint32_t seed) {
-  const int ix = static_cast<int>(std::floor(x));
-  const int iy = static_cast<int>(std::floor(y));
+  const int ix = whole(x);
+  const int iy = whole(y);
   const float fx = smooth(x - static_cast<float>(ix));
   const float fy = smooth(y - static_cast<float>(iy));
   const auto corner = [&](int i, int j) { return unit(mix(cell(i % period), cell(j % period), seed)); };
@@ -85,8 +85,8 @@ std::vector<float> cracks(std::uint32_t seed) {
       const auto at = static_cast<std::size_t>(y * kSize + x);
       const float px = (static_cast<float>(x) + 14.0F * bend[at]) * kCells / kSize;
       const float py = (static_cast<float>(y) + 14.0F * bend[(at + 7777) % bend.size()]) * kCells / kSize;
-      const int ix = static_cast<int>(std::floor(px));
-      const int iy = static_cast<int>(std::floor(py));
+      const int ix = static_cast<int>(simulation::floor(px));
+      const int iy = static_cast<int>(simulation::floor(py));
       float nearest = 9.0F;
       float second = 9.0F;
       for (int j = -1; j <= 1; ++j) {
@@ -122,8 +122,8 @@ std::vector<float> leaves(std::uint32_t seed) {
 }  // namespace
 
 float value_noise(float x, float y, std::uint32_t seed) {
-  const float bx = std::floor(x);
-  const float by = std::floor(y);
+  const float bx = simulation::floor(x);
+  const float by = simulation::floor(y);
   const int ix = static_cast<int>(bx);
   const int iy = static_cast<int>(by);
   const float fx = smooth(x - bx);
@@ -175,8 +175,8 @@ float DetailTexture::bilinear(int level, float u, float v) const {
   const int size = kSize >> level;
   const float x = u * static_cast<float>(size) - 0.5F;
   const float y = v * static_cast<float>(size) - 0.5F;
-  const float bx = std::floor(x);
-  const float by = std::floor(y);
+  const float bx = simulation::floor(x);
+  const float by = simulation::floor(y);
   const float fx = x - bx;
   const float fy = y - by;
   const int mask = size - 1;

@@ -31,6 +31,14 @@ constexpr float normal(std::uint32_t bits) {
   return (static_cast<float>(sum) - 510.0F) * (1.0F / 147.8F);
 }
 
+/// The whole number below x. Where the processor is assumed to be an old one, std::floor is a call of a
+/// function.
+constexpr int whole(float x) {
+  const int i = static_cast<int>(x);
+  return static_cast<float>(i) > x ? i - 1 : i;
+}
+constexpr float floor(float x) { return static_cast<float>(whole(x)); }
+
 /// A stream of random numbers for laying out the world.
 class Dice {
  public:

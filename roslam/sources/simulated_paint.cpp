@@ -47,8 +47,8 @@ Vector3f Painter::sky(const Vector3f& direction) const {
 Vector3f Painter::litter(const Vector3f& ground, const Vector2f& p, float w) const {
   if (w > 0.08F) return ground;
   constexpr float kCell = 0.45F;
-  const int i = static_cast<int>(std::floor(p.x() / kCell));
-  const int j = static_cast<int>(std::floor(p.y() / kCell));
+  const int i = whole(p.x() / kCell);
+  const int j = whole(p.y() / kCell);
   const auto bits = mix(index(i), index(j), seed_);
   if (unit(bits) > 0.22F) return ground;  // one fallen leaf or scrap of paper in some of the cells
   const Vector2f centre((static_cast<float>(i) + between(mix(bits, 1), 0.25F, 0.75F)) * kCell,
@@ -68,9 +68,9 @@ Vector3f Painter::pavement(const Spot& spot) const {
   const Vector2f& p = spot.point.z() < 1.0F ? Vector2f(spot.point.head<2>()) : spot.uv;
   const float w = spot.footprint;
   constexpr float kStone = 0.5F;
-  const float row = std::floor(p.y() / kStone);
+  const float row = simulation::floor(p.y() / kStone);
   const Vector2f q(p.x() / kStone + 0.5F * std::fmod(std::abs(row), 2.0F), p.y() / kStone);
-  const int i = static_cast<int>(std::floor(q.x()));
+  const int i = whole(q.x());
   const auto bits = mix(index(i), index(static_cast<int>(row)), seed_);
   const Vector2f in((q.x() - static_cast<float>(i)) * kStone, (q.y() - row) * kStone);
   const float joint = 0.014F;
@@ -140,7 +140,7 @@ Vector3f Painter::cloth(const Surface& surface, const Spot& spot) const {
   const Vector3f other(0.9F - 0.6F * surface.colour.z(), 0.85F - 0.6F * surface.colour.x(),
                        0.85F - 0.6F * surface.colour.y());
   const auto wave = [&](float value, float period) {
-    const float phase = value / period - std::floor(value / period);
+    const float phase = value / period - simulation::floor(value / period);
     const float fade = std::clamp(1.5F - w / period * 2.0F, 0.0F, 1.0F);
     return 0.5F + (span(phase, 0.0F, 0.5F, w / period) - 0.5F) * fade;
   };
@@ -186,13 +186,13 @@ Vector3f Painter::albedo(const Surface& surface, const Spot& spot) const {
     }
     case Material::kKerb: {
       const Vector2f p(spot.point.x() + spot.point.y(), spot.point.z());
-      const float joint = span(p.x() - std::floor(p.x()), 0.012F, 1.0F, w);
+      const float joint = span(p.x() - simulation::floor(p.x()), 0.012F, 1.0F, w);
       return surface.colour * (surface.seed == 7 ? 1.15F : 1.0F) *
              (0.75F + 0.25F * joint + 0.2F * mottle(p, w, 9));
     }
     case Material::kRoof: {
-      const float row = std::floor(uv.y() / 0.28F);
-      const float column = std::floor(uv.x() / 0.24F + 0.5F * std::fmod(row, 2.0F));
+      const float row = simulation::floor(uv.y() / 0.28F);
+      const float column = simulation::floor(uv.x() / 0.24F + 0.5F * std::fmod(row, 2.0F));
       const auto bits = mix(index(static_cast<int>(row)), index(static_cast<int>(column)), surface.seed);
       const float in = uv.y() / 0.28F - row;
       return surface.colour * (0.8F + 0.35F * unit(bits) + 0.2F * grain(uv, 2.3F, w)) *

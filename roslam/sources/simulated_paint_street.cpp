@@ -33,18 +33,18 @@ float Painter::marking(const Vector2f& p, float w) const {
       std::abs(on_x ? across_y : across_x) - plan_.kerb;  // from the edge of the crossing
   float paint = 0.0F;
   if (to_crossing < 4.2F) {  // zebra stripes, then the line to stop at
-    const float stripe = across - std::floor(across);
+    const float stripe = across - simulation::floor(across);
     paint = span(stripe, 0.25F, 0.75F, w) * span(to_crossing, 0.7F, 3.2F, w) *
             span(across, -plan_.kerb + 0.3F, plan_.kerb - 0.3F, w);
   } else {
     if (to_crossing < 5.0F) {
       paint = span(to_crossing, 4.3F, 4.75F, w) * span(std::abs(across), 0.1F, 3.0F, w);
     }
-    const float dash = along - 6.0F * std::floor(along / 6.0F);
+    const float dash = along - 6.0F * simulation::floor(along / 6.0F);
     paint = std::max(paint, span(across, -0.07F, 0.07F, w) * span(dash, 0.0F, 3.0F, w));
     // The bays for parking: a broken line, and a short stroke between bays.
     const float side = std::abs(across);
-    const float bay = along - 6.2F * std::floor(along / 6.2F);
+    const float bay = along - 6.2F * simulation::floor(along / 6.2F);
     paint = std::max(paint, span(side, 3.05F, 3.15F, w) * span(bay, 0.0F, 5.2F, w));
     paint = std::max(paint, span(side, 3.05F, 5.1F, w) * span(bay, 0.0F, 0.1F, w));
   }
@@ -58,8 +58,8 @@ Vector3f Painter::road(const Spot& spot) const {
   float tone = 0.40F + 0.17F * blotches;
   // Repaired patches: rectangles of newer asphalt with a seam of tar.
   constexpr float kCell = 4.3F;
-  const int i = static_cast<int>(std::floor(p.x() / kCell));
-  const int j = static_cast<int>(std::floor(p.y() / kCell));
+  const int i = whole(p.x() / kCell);
+  const int j = whole(p.y() / kCell);
   const auto bits = mix(index(i), index(j), mix(seed_, 31));
   const Vector2f in(p.x() - static_cast<float>(i) * kCell, p.y() - static_cast<float>(j) * kCell);
   if (unit(bits) < 0.3F) {
@@ -85,8 +85,8 @@ Vector3f Painter::road(const Spot& spot) const {
     const Vector2f centre(between(mix(bits, 10), 0.6F, 3.7F), between(mix(bits, 11), 0.6F, 3.7F));
     const Vector2f d = in - centre;
     const float r = d.norm();
-    const float lattice = span(d.x() / 0.09F - std::floor(d.x() / 0.09F), 0.3F, 1.0F, w / 0.09F) *
-                          span(d.y() / 0.09F - std::floor(d.y() / 0.09F), 0.3F, 1.0F, w / 0.09F);
+    const float lattice = span(d.x() / 0.09F - simulation::floor(d.x() / 0.09F), 0.3F, 1.0F, w / 0.09F) *
+                          span(d.y() / 0.09F - simulation::floor(d.y() / 0.09F), 0.3F, 1.0F, w / 0.09F);
     colour = blend(colour, Vector3f::Constant(0.2F), span(r, -1, 0.36F, w));
     colour = blend(colour, Vector3f::Constant(0.3F + 0.2F * lattice), span(r, -1, 0.31F, w));
   }
@@ -104,9 +104,9 @@ Vector3f Painter::wall(const FacadePlan& plan, const Spot& spot, std::uint32_t s
     return plan.wall *
            (1.0F + 0.22F * blotches + 0.09F * rain + 0.2F * crack * std::clamp(0.3F + blotches, 0.0F, 1.0F));
   }
-  const float row = std::floor(uv.y() / 0.085F);
+  const float row = simulation::floor(uv.y() / 0.085F);
   const float x = uv.x() / 0.26F + 0.5F * std::fmod(std::abs(row), 2.0F);
-  const float column = std::floor(x);
+  const float column = simulation::floor(x);
   const auto bits = mix(index(static_cast<int>(row)), index(static_cast<int>(column)), seed);
   const float fade = std::clamp(1.6F - w / 0.06F, 0.0F, 1.0F);
   const float brick =
@@ -133,7 +133,7 @@ Vector3f Painter::window(const FacadePlan& plan, const Vector2f& at, const Vecto
     glass = blend(glass, folds * Vector3f(0.92F, 0.88F - 0.2F * unit(mix(bits, 3)), 0.78F), 0.8F * curtain);
   } else if (kind < 0.65F) {
     const float drop = between(mix(bits, 2), 0.2F, 0.9F) * size.y();
-    const float slat = at.y() / 0.07F - std::floor(at.y() / 0.07F);
+    const float slat = at.y() / 0.07F - simulation::floor(at.y() / 0.07F);
     const float fade = std::clamp(1.5F - w / 0.035F, 0.0F, 1.0F);
     glass = blend(glass, Vector3f::Constant(0.68F - 0.18F * fade * span(slat, 0, 0.3F, w / 0.07F)),
                   span(at.y(), size.y() - drop, size.y(), w));
@@ -152,14 +152,14 @@ Vector3f Painter::window(const FacadePlan& plan, const Vector2f& at, const Vecto
 
 Vector3f Painter::shop(const FacadePlan& plan, const Vector2f& uv, float width, float w,
                        std::uint32_t seed) const {
-  const float pane = width / std::max(1.0F, std::floor(width / 2.6F));
-  const float column = std::floor(uv.x() / pane);
+  const float pane = width / std::max(1.0F, simulation::floor(width / 2.6F));
+  const float column = simulation::floor(uv.x() / pane);
   const auto bits = mix(seed, index(static_cast<int>(column)));
   const Vector2f at(uv.x() - column * pane, uv.y());
   const Vector3f& base = plan.shop_colour;
   if (uv.y() > 2.75F) {  // the name of the shop: a row of letters
     const float letter = uv.x() / 0.32F;
-    const float cell = std::floor(letter);
+    const float cell = simulation::floor(letter);
     const auto glyph = mix(mix(seed, 40), index(static_cast<int>(cell)));
     const Vector2f in((letter - cell) * 5.0F, (uv.y() - 2.95F) / 0.38F * 7.0F);
     const bool inside = in.y() > 0 && in.y() < 7 && in.x() < 4 && uv.x() > 0.5F && uv.x() < width * 0.7F &&
@@ -175,8 +175,8 @@ Vector3f Painter::shop(const FacadePlan& plan, const Vector2f& uv, float width, 
   const auto item = mix(bits, index(static_cast<int>(shelf)), index(static_cast<int>(uv.x() / 0.31F)));
   if (unit(item) < 0.65F) {
     const float high = between(mix(item, 1), 0.3F, 0.85F);
-    const float inside = span(shelf - std::floor(shelf), 0.06F, high, w / 0.55F) *
-                         span(uv.x() / 0.31F - std::floor(uv.x() / 0.31F), 0.12F, 0.88F, w / 0.31F);
+    const float inside = span(shelf - simulation::floor(shelf), 0.06F, high, w / 0.55F) *
+                         span(uv.x() / 0.31F - simulation::floor(uv.x() / 0.31F), 0.12F, 0.88F, w / 0.31F);
     goods = blend(goods,
                   {between(mix(item, 2), 0.15F, 0.8F), between(mix(item, 3), 0.15F, 0.7F),
                    between(mix(item, 4), 0.15F, 0.7F)},
@@ -197,13 +197,14 @@ Vector3f Painter::facade(const Surface& surface, const Spot& spot) const {
   const auto seed = mix(surface.seed, static_cast<std::uint32_t>(surface.size.x() * 64.0F));
   if (surface.size.y() < 2.0F) return wall(plan, spot, seed);  // a garden wall
   if (plan.shop && v < plan.ground - 0.12F) return shop(plan, spot.uv, surface.size.x(), w, seed);
-  const float column = std::clamp(std::floor(u / plan.column), 0.0F, static_cast<float>(plan.columns - 1));
+  const float column =
+      std::clamp(simulation::floor(u / plan.column), 0.0F, static_cast<float>(plan.columns - 1));
   const float in = u - (column + 0.5F) * plan.column + plan.window_width / 2;
-  const float storey = std::floor((v - plan.ground) / plan.storey);
+  const float storey = simulation::floor((v - plan.ground) / plan.storey);
   const bool ground = storey < 0;
-  const float floor = ground ? 0.0F : plan.ground + storey * plan.storey;
+  const float foot = ground ? 0.0F : plan.ground + storey * plan.storey;
   const bool door = ground && column == 0;
-  const float base = floor + (door ? 0.28F : ground ? 1.1F : plan.sill);
+  const float base = foot + (door ? 0.28F : ground ? 1.1F : plan.sill);
   const float height = door ? 2.3F : plan.window_height;
   Vector3f colour = wall(plan, spot, seed);
   if (ground && !plan.brick) colour *= v < 0.7F ? 0.72F : 0.93F;  // the plinth

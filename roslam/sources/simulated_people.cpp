@@ -66,8 +66,8 @@ void add_trunk(MeshBuilder& builder, const Looks& looks, const Vector3f& hip, co
   builder.tube(hip - 0.05F * h * up, hip + 0.06F * h * up, 0.085F * h, 0.09F * h, 12, 0.75F);
   builder.use(looks.top);
   const Vector3f chest = hip + 0.72F * (neck - hip);
-  builder.tube(hip + 0.02F * h * up, chest, 0.092F * h, 0.118F * h, 12, 0.66F);
-  builder.tube(chest, neck - 0.005F * h * up, 0.118F * h, 0.05F * h, 12, 0.66F);
+  builder.tube(hip + 0.02F * h * up, chest, 0.088F * h, 0.105F * h, 12, 0.66F);
+  builder.tube(chest, neck - 0.012F * h * up, 0.105F * h, 0.045F * h, 12, 0.7F);
   builder.use(looks.skin);
   builder.tube(neck - 0.03F * h * up, neck + 0.05F * h * up, 0.034F * h, 0.032F * h, 8);
   const Vector3f head = neck + 0.088F * h * up + Vector3f(0.012F * h, 0, 0);
@@ -88,13 +88,14 @@ void add_trunk(MeshBuilder& builder, const Looks& looks, const Vector3f& hip, co
 
 // A ring of short tubes in the plane of the bicycle.
 void add_wheel(MeshBuilder& builder, float x, float radius, float turn) {
-  constexpr int kParts = 18;
+  const int parts = builder.detail() > 0.5F ? 18 : 9;
   const auto rim = [&](float r, float angle) {
     return Vector3f(x + r * std::cos(angle), 0, radius + r * std::sin(angle));
   };
-  for (int i = 0; i < kParts; ++i) {
-    const float a = 2 * kPi * static_cast<float>(i) / kParts;
-    builder.tube(rim(radius - 0.015F, a), rim(radius - 0.015F, a + 2 * kPi / kParts), 0.022F, 0.022F, 5);
+  const float step = 2 * kPi / static_cast<float>(parts);
+  for (int i = 0; i < parts; ++i) {
+    const float a = 2 * kPi * static_cast<float>(i) / static_cast<float>(parts);
+    builder.tube(rim(radius - 0.015F, a), rim(radius - 0.015F, a + step), 0.022F, 0.022F, 5);
     if (i % 3 == 0) builder.tube(rim(0.0F, a - turn), rim(radius - 0.02F, a - turn), 0.006F, 0.006F, 3);
   }
 }
@@ -150,12 +151,13 @@ void add_pedestrian(MeshBuilder& builder, const Stance& stance, std::uint16_t in
     const Vector3f toe = ankle + Vector3f(0.1F * h, 0, -0.022F * h - 0.02F * h * lift);
     builder.tube(ankle - Vector3f(0.035F * h, 0, 0.022F * h), toe, 0.026F * h, 0.02F * h, 7);
     const float arm = -0.55F * swing;
-    const Vector3f shoulder = neck + Vector3f(-0.01F * h, side * 0.115F * h, -0.035F * h);
-    const Vector3f elbow = shoulder + 0.17F * h * Vector3f(std::sin(arm), side * 0.14F, -std::cos(arm));
+    const Vector3f shoulder = neck + Vector3f(-0.01F * h, side * 0.098F * h, -0.042F * h);
+    const Vector3f elbow = shoulder + 0.17F * h * Vector3f(std::sin(arm), side * 0.1F, -std::cos(arm));
     const float bend = arm + 0.35F;
     const Vector3f hand = elbow + 0.16F * h * Vector3f(std::sin(bend), 0, -std::cos(bend));
     builder.use(looks.top);
-    limb(builder, shoulder, elbow, hand, 0.033F * h, 0.021F * h);
+    limb(builder, shoulder, elbow, hand, 0.03F * h, 0.019F * h);
+    builder.ellipsoid(shoulder, {0.032F * h, 0.03F * h, 0.032F * h}, 6, 8);
     builder.use(looks.skin);
     builder.ellipsoid(hand, {0.024F * h, 0.017F * h, 0.034F * h}, 5, 7);
   }

@@ -184,7 +184,7 @@ Vector3f Renderer::shade(const Eye& eye, const Hits& hits, std::size_t i) const 
   const float facing = std::max(-normal.dot(towards), 0.04F);
   // Between the width and the height of a pixel on a slanted surface: no shimmer, and not blurred more than
   // need be.
-  const float footprint = hits.depth[i] * eye.inverse_fx * std::pow(facing, -0.6F);
+  const float footprint = hits.depth[i] * eye.inverse_fx / (std::sqrt(facing) * (0.8F + 0.2F * facing));
   const Vector3f albedo = painter_.albedo(surface, {hits.uv[i], hits.point[i], footprint});
   const float lambert = hits.sunlit[i] ? normal.dot(sun_direction()) : 0.0F;
   const float sky = (hits.covered[i] ? 0.35F : 1.0F) * (0.47F + 0.13F * normal.z());
@@ -205,13 +205,24 @@ Vector3f Renderer::shade(const Eye& eye, const Hits& hits, std::size_t i) const 
   return colour + haze * (Vector3f(0.78F, 0.82F, 0.87F) - colour);
 }
 
-void Renderer::sample(const Eye& eye, const Points& points, bool movables, Samples& samples) const {
+// Points come in groups of `group` within one pixel. Those of a group that show the same are painted once:
+// the painter blurs what is smaller than a pixel by itself.
+void Renderer::sample(const Eye& eye, const Points& points, int group, bool movables,
+                      Samples& samples) const {
   Hits hits;
   trace(eye, points, movables, hits);
   light(eye, movables, hits);
   for (std::size_t i = 0; i < static_cast<std::size_t>(points.count); ++i) {
     Sample& s = samples[i];
-    s.colour = shade(eye, hits, i);
+    const auto same = [&](std::size_t j) {
+      return hits.part[j] == hits.part[i] && hits.sunlit[j] == hits.sunlit[i] &&
+             hits.covered[j] == hits.covered[i] && hits.surface[i] != nullptr &&
+             hits.normal[j].dot(hits.normal[i]) > 0.97F &&
+             std::abs(hits.depth[j] - hits.depth[i]) < kEdge * hits.depth[i];
+    };
+    std::size_t twin = i - i % static_cast<std::size_t>(group);
+    while (twin < i && !same(twin)) ++twin;
+    s.colour = twin < i ? samples[twin].colour : shade(eye, hits, i);
     s.depth = hits.depth[i];
     s.part = hits.part[i] | (hits.sunlit[i] ? 0 : kShadow);
     s.instance = hits.surface[i] != nullptr ? hits.surface[i]->instance : std::uint16_t{0};
@@ -231,7 +242,7 @@ void Renderer::draw_centres(const Eye& eye, const std::vector<cv::Point>& pixels
       points.x[i] = static_cast<float>(pixel.x);
       points.y[i] = static_cast<float>(pixel.y);
     }
-    sample(eye, points, movables, samples);
+    sample(eye, points, 1, movables, samples);
     for (std::size_t i = 0; i < static_cast<std::size_t>(points.count); ++i) {
       const cv::Point& pixel = pixels[first + i];
       const Sample& s = samples[i];
@@ -260,7 +271,7 @@ void Renderer::smooth_edges(const Eye& eye, const std::vector<cv::Point>& pixels
       points.x[i] = static_cast<float>(pixel.x) + kOffsets[i % kPerPixel][0];
       points.y[i] = static_cast<float>(pixel.y) + kOffsets[i % kPerPixel][1];
     }
-    sample(eye, points, movables, samples);
+    sample(eye, points, kPerPixel, movables, samples);
     for (std::size_t j = 0; j < static_cast<std::size_t>(points.count) / kPerPixel; ++j) {
       const cv::Point& pixel = pixels[first + j];
       Vector3f sum = Vector3f::Zero();

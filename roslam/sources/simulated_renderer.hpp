@@ -54,7 +54,7 @@ class Renderer {
   struct Eye;
   struct Hits;
 
-  void sample(const Eye& eye, const Points& points, bool movables, Samples& samples) const;
+  void sample(const Eye& eye, const Points& points, int group, bool movables, Samples& samples) const;
   void trace(const Eye& eye, const Points& points, bool movables, Hits& hits) const;
   void light(const Eye& eye, bool movables, Hits& hits) const;
   Vector3f shade(const Eye& eye, const Hits& hits, std::size_t i) const;

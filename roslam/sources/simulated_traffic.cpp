@@ -165,6 +165,7 @@ void Traffic::add_to(Mesh& mesh, double time, const SE3& T_world_camera) const {
     const float depth = offset.dot(ahead);
     const float aside = std::abs(offset.x() * ahead.y() - offset.y() * ahead.x());
     if (depth < -kBehind || depth > kSight || aside > 1.1F * std::max(depth, 0.0F) + 9.0F) continue;
+    builder.set_detail(std::clamp(8.0F / std::max(depth, 1.0F), 0.3F, 1.0F));
     switch (actor.kind) {
       case Kind::kCar:
         add_car(builder, stance, actor.instance, actor.seed);
