@@ -17,8 +17,7 @@ namespace roslam::app {
 
 namespace {
 struct RunArguments {
-  std::string source;
-  std::string camera;
+  SourceArguments source;
   std::string out;
   std::string config;
   bool deterministic = false;
@@ -26,7 +25,6 @@ struct RunArguments {
   bool print_config = false;
   bool quiet = false;
   bool json = false;
-  std::uint64_t seed = 1;
 };
 
 void require_frames(const Slam& slam, const FrameSource& source, const std::string& name) {
@@ -56,10 +54,10 @@ void execute(const RunArguments& arguments, const std::string& version) {
     std::cout << options_to_yaml(options);
     return;
   }
-  if (arguments.source.empty()) throw CLI::RequiredError("SOURCE");
+  if (arguments.source.name.empty()) throw CLI::RequiredError("SOURCE");
   if (arguments.out.empty()) throw CLI::RequiredError("--out");
   const InterruptWatcher interrupt;
-  const auto source = open_source(arguments.source, arguments.camera, arguments.seed);
+  const auto source = open_source(arguments.source);
   const RunFolder folder(arguments.out);
   Slam slam(source->camera(), options, arguments.real_time ? Mode::kRealTime : Mode::kDeterministic);
   RunSummary summary;
@@ -69,9 +67,9 @@ void execute(const RunArguments& arguments, const std::string& version) {
         *source, slam, [&](const FrameResult& frame) { progress.show(frame.index + 1, name_of(frame.state)); },
         interrupt.token());
   }
-  const RunDescription description{arguments.source, arguments.camera, version};
+  const RunDescription description{arguments.source.name, arguments.source.camera, version};
   folder.write(slam, summary, *source, description);
-  require_frames(slam, *source, arguments.source);
+  require_frames(slam, *source, arguments.source.name);
   if (arguments.json) {
     std::cout << nlohmann::json::parse(run_report(slam, summary, *source, description)).dump() << "\n";
   } else {
@@ -89,10 +87,10 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n"
       "  roslam run my_flight --camera my_camera.yaml --real-time --out live\n"
       "RUN then holds trajectory.txt and keyframes.txt (TUM format), map.ply, trajectory.png and run.json.");
-  command->add_option("SOURCE", arguments->source,
+  command->add_option("SOURCE", arguments->source.name,
                       "A folder in TUM RGB-D format, or simulated:street, simulated:loop, simulated:hover, "
                       "simulated:turn");
-  command->add_option("--camera", arguments->camera,
+  command->add_option("--camera", arguments->source.camera,
                       "A preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file");
   command->add_option("--out", arguments->out, "Folder the results are written to; made if it does not exist");
   command->add_option("--config", arguments->config, "YAML file with options; --print-config shows them all");
@@ -102,7 +100,11 @@ void add_run_command(CLI::App& program, const std::string& version) {
       ->add_flag("--real-time", arguments->real_time,
                  "Stages on threads, frames at the pace of their timestamps; late frames are dropped and counted")
       ->excludes(deterministic);
-  command->add_option("--seed", arguments->seed, "Seed of a simulated flight")->capture_default_str();
+  command->add_option("--traffic", arguments->source.traffic, "Of a simulated flight: none, light or heavy")
+      ->check(CLI::IsMember({"none", "light", "heavy"}))
+      ->capture_default_str();
+  command->add_option("--frames", arguments->source.frames, "Of a simulated flight; 0 = all")->capture_default_str();
+  command->add_option("--seed", arguments->source.seed, "Of a simulated flight")->capture_default_str();
   command->add_flag("--print-config", arguments->print_config, "Print the effective options and stop");
   command->add_flag("--quiet", arguments->quiet, "No progress");
   command->add_flag("--json", arguments->json, "Print the report as one JSON object");

@@ -1,8 +1,227 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "apps/roslam/commands.hpp"
+#include "roslam/error.hpp"
+#include "roslam/sources/simulated_source.hpp"
 
 namespace roslam::app {
+namespace {
 
-void add_simulate_command(CLI::App&) {}
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+struct SimulateArguments {
+  std::string path;
+  fs::path out;
+  std::string traffic = "light";
+  std::string depth = "d455";
+  std::size_t frames = 0;
+  std::uint32_t seed = 1;
+  bool json = false;
+};
+
+constexpr const char* kHelp = R"(Render a drone's flight through a street, with everything known about it.
+
+Nothing is downloaded: houses, trees, cars and people are made up from the seed. The folder can be given to
+`roslam run` as any recorded one in the TUM format; the truth lies beside it.
+
+Example, ten seconds among many cars and people:
+  roslam simulate street --traffic heavy --frames 300 --out flight
+
+Writes to the folder, images named after their time in seconds:
+  rgb/ rgb.txt            colour
+  depth/ depth.txt        depth, 16 bit, 1000 a metre, 0 = unknown
+  groundtruth.txt         camera poses: time, position (m), quaternion x y z w
+  camera.yaml             the camera, for --camera
+  labels/                 class of each pixel: Cityscapes train ids, 255 = none of them
+  instances/              which moving thing each pixel shows, 16 bit, 0 = none
+  background/rgb, depth   the same views without anything that can move, parked cars included)";
+
+std::string stamp(double timestamp) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.6f", timestamp);
+  return text;
+}
+
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw OutputError("cannot create the folder " + folder.string() + ": " + error.message());
+}
+
+void write_image(const fs::path& file, const cv::Mat& image) {
+  bool written = false;
+  try {
+    written = cv::imwrite(file.string(), image, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  } catch (const cv::Exception&) {
+    written = false;
+  }
+  if (!written)
+    throw OutputError("cannot write " + file.string() + ": is the folder writable and the disk not full?");
+}
+
+/// A text file that is written line by line and checked at its end.
+class TextFile {
+ public:
+  explicit TextFile(fs::path file) : file_(std::move(file)), stream_(file_) { check(); }
+  void line(const std::string& text) {
+    stream_ << text << "\n";
+    check();
+  }
+  void close() {
+    stream_.close();
+    check();
+  }
+
+ private:
+  void check() const {
+    if (!stream_)
+      throw OutputError("cannot write " + file_.string() + ": is the folder writable and the disk not full?");
+  }
+  fs::path file_;
+  std::ofstream stream_;
+};
+
+std::string pose_line(double timestamp, const SE3& pose) {
+  const auto& t = pose.translation();
+  const auto& q = pose.rotation();
+  char text[256];
+  std::snprintf(text, sizeof(text), "%.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f", timestamp, t.x(), t.y(), t.z(),
+                q.x(), q.y(), q.z(), q.w());
+  return text;
+}
+
+cv::Mat packed(const cv::Mat& depth, const Camera& camera) {
+  cv::Mat image;
+  depth.convertTo(image, CV_16U,
+                  camera.depth_units_per_metre);  // what does not fit becomes the largest value
+  image.setTo(0, depth * camera.depth_units_per_metre > 65535.0);
+  return image;
+}
+
+/// Tells on stderr how far the work has come: a bar on a terminal, else a line every two seconds.
+class Progress {
+ public:
+  explicit Progress(std::size_t total) : total_(total), terminal_(isatty(STDERR_FILENO) != 0) {}
+  void report(std::size_t done) {
+    const auto now = Clock::now();
+    const auto since = std::chrono::duration<double>(now - last_).count();
+    if (since < (terminal_ ? 0.1 : 2.0) && !(terminal_ && done == total_)) return;
+    last_ = now;
+    const double rate = static_cast<double>(done) / std::chrono::duration<double>(now - start_).count();
+    char text[160];
+    if (terminal_) {
+      const std::size_t filled = 30 * done / total_;
+      const std::string bar = std::string(filled, '#') + std::string(30 - filled, '.');
+      std::snprintf(text, sizeof(text), "\r[%s] %zu of %zu frames, %.1f a second %s", bar.c_str(), done,
+                    total_, rate, done == total_ ? "\n" : "");
+    } else {
+      std::snprintf(text, sizeof(text), "rendered %zu of %zu frames, %.1f a second\n", done, total_, rate);
+    }
+    std::cerr << text << std::flush;
+  }
+
+ private:
+  std::size_t total_;
+  bool terminal_;
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point last_ = start_;
+};
+
+void write_images(const fs::path& out, const std::string& name, const SimulatedView& view,
+                  const Camera& camera) {
+  write_image(out / "rgb" / name, view.frame.colour);
+  write_image(out / "depth" / name, packed(view.frame.depth, camera));
+  write_image(out / "labels" / name, view.frame.labels);
+  write_image(out / "instances" / name, view.instances);
+  write_image(out / "background" / "rgb" / name, view.background_colour);
+  write_image(out / "background" / "depth" / name, packed(view.background_depth, camera));
+}
+
+void simulate(const SimulateArguments& arguments) {
+  SimulatorOptions options;
+  options.path = *flight_path_from(arguments.path);
+  options.traffic = *traffic_level_from(arguments.traffic);
+  options.depth = *depth_model_from(arguments.depth);
+  options.frames = arguments.frames;
+  options.seed = arguments.seed;
+  for (const char* folder : {"rgb", "depth", "labels", "instances", "background/rgb", "background/depth"}) {
+    make_folder(arguments.out / folder);
+  }
+  const auto start = Clock::now();
+  Simulator simulator(options);
+  TextFile camera(arguments.out / "camera.yaml");
+  camera.line(camera_to_yaml(simulator.camera()));
+  camera.close();
+  TextFile colours(arguments.out / "rgb.txt");
+  TextFile depths(arguments.out / "depth.txt");
+  TextFile poses(arguments.out / "groundtruth.txt");
+  colours.line("# timestamp filename");
+  depths.line("# timestamp filename");
+  poses.line("# timestamp tx ty tz qx qy qz qw");
+  Progress progress(simulator.size());
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    const SimulatedView view = simulator.render(i, SimulatedParts::kBackground);
+    const std::string time = stamp(view.frame.timestamp);
+    write_images(arguments.out, time + ".png", view, simulator.camera());
+    colours.line(time + " rgb/" + time + ".png");
+    depths.line(time + " depth/" + time + ".png");
+    poses.line(pose_line(view.frame.timestamp, *view.frame.T_world_camera));
+    progress.report(i + 1);
+  }
+  colours.close();
+  depths.close();
+  poses.close();
+  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  if (arguments.json) {
+    const nlohmann::json summary{{"out", arguments.out.string()}, {"path", arguments.path},
+                                 {"traffic", arguments.traffic},  {"depth", arguments.depth},
+                                 {"seed", arguments.seed},        {"frames", simulator.size()},
+                                 {"fps", simulator.camera().fps}, {"seconds", seconds}};
+    std::cout << summary.dump() << "\n";
+  } else {
+    std::cout << "wrote " << simulator.size() << " frames to " << arguments.out.string() << "\n";
+  }
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& program) {
+  auto arguments = std::make_shared<SimulateArguments>();
+  CLI::App* command = program.add_subcommand("simulate", kHelp);
+  command
+      ->add_option(
+          "path", arguments->path,
+          "street: 50 m along a street; loop: around a block; hover: turns on the spot; turn: round a corner")
+      ->required()
+      ->check(CLI::IsMember({"street", "loop", "hover", "turn"}));
+  command->add_option("--out", arguments->out, "Folder to write to; made where it is missing")->required();
+  command->add_option("--traffic", arguments->traffic, "none (parked cars only), light or heavy")
+      ->check(CLI::IsMember({"none", "light", "heavy"}))
+      ->capture_default_str();
+  command
+      ->add_option("--frames", arguments->frames,
+                   "How many frames to write, 30 a second; default the whole flight")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--depth", arguments->depth, "ideal, or d455: with the noise and holes of such a camera")
+      ->check(CLI::IsMember({"ideal", "d455"}))
+      ->capture_default_str();
+  command->add_option("--seed", arguments->seed, "Another number makes another city")->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print a summary as one JSON object");
+  command->callback([arguments] { simulate(*arguments); });
+}
 
 }  // namespace roslam::app

@@ -2,15 +2,38 @@
 #include "apps/roslam/sources.hpp"
 
 #include "roslam/error.hpp"
+#include "roslam/sources/simulated_source.hpp"
 #include "roslam/sources/tum_source.hpp"
 
 namespace roslam::app {
 
-std::unique_ptr<FrameSource> open_source(const std::string& name, const std::string& camera, std::uint64_t) {
-  if (camera.empty()) {
-    throw InputError(name + ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a file");
+namespace {
+constexpr std::string_view kSimulated = "simulated:";
+
+std::unique_ptr<FrameSource> open_simulation(const SourceArguments& arguments) {
+  const auto path = flight_path_from(arguments.name.substr(kSimulated.size()));
+  const auto traffic = traffic_level_from(arguments.traffic);
+  if (!path) throw InputError(arguments.name + ": no such flight; use simulated:street, :loop, :hover or :turn");
+  if (!traffic) throw InputError("--traffic " + arguments.traffic + ": use none, light or heavy");
+  if (!arguments.camera.empty() && arguments.camera != "simulated") {
+    throw InputError("--camera " + arguments.camera + ": a simulated flight brings its own camera; leave it out");
   }
-  return std::make_unique<TumSource>(name, load_camera(camera));
+  SimulatorOptions options;
+  options.path = *path;
+  options.traffic = *traffic;
+  options.frames = arguments.frames;
+  options.seed = arguments.seed;
+  return std::make_unique<SimulatedSource>(options);
+}
+}  // namespace
+
+std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
+  if (arguments.name.starts_with(kSimulated)) return open_simulation(arguments);
+  if (arguments.camera.empty()) {
+    throw InputError(arguments.name +
+                     ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a file");
+  }
+  return std::make_unique<TumSource>(arguments.name, load_camera(arguments.camera));
 }
 
 }  // namespace roslam::app

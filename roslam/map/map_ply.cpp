@@ -3,15 +3,15 @@
 
 #include <bit>
 #include <cstring>
-#include <fstream>
+#include <sstream>
 
-#include "roslam/error.hpp"
+#include "roslam/write_file.hpp"
 
 namespace roslam {
 
 void write_map_ply(const std::filesystem::path& file, const Map& map) {
   static_assert(std::endian::native == std::endian::little, "the PLY header promises little-endian values");
-  std::ofstream out(file, std::ios::binary);
+  std::ostringstream out;
   const auto ids = map.landmark_ids();
   out << "ply\nformat binary_little_endian 1.0\ncomment RO-SLAM sparse map, world frame, metres\n"
       << "element vertex " << ids.size() << "\n"
@@ -25,8 +25,7 @@ void write_map_ply(const std::filesystem::path& file, const Map& map) {
     for (int c = 0; c < 3; ++c) record[12 + c] = static_cast<char>(landmark.colour[2 - c]);
     out.write(record, sizeof(record));
   }
-  out.flush();
-  if (!out) throw OutputError(file.string() + ": cannot write the map; is the folder writable and the disk not full?");
+  write_file(file, out.str());
 }
 
 }  // namespace roslam

@@ -73,6 +73,7 @@ class Runner {
   void process(const Frame& frame) {
     const auto result = slam_.process(frame);
     if (!result) return;
+    if (frame.T_world_camera) summary_.truth.push_back({frame.timestamp, *frame.T_world_camera});
     if (summary_.first_pose_seconds < 0.0 && result->T_world_camera) {
       summary_.first_pose_seconds = seconds_since(start_);
     }

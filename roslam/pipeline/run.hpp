@@ -15,6 +15,7 @@ struct RunSummary {
   bool interrupted = false;           ///< stopped before the source ended
   double wall_seconds = 0.0;          ///< from the first read to the last result
   double first_pose_seconds = -1.0;   ///< from the first read to the first pose; negative = no pose
+  Trajectory truth;                   ///< true poses of the frames, where the source knows them
 };
 
 /// Feeds a source through the pipeline until it ends or a stop is requested; the frame in work is finished first.

@@ -22,6 +22,7 @@ struct RunDescription {
 ///   keyframes.txt   poses of the keyframes (TUM format)
 ///   map.ply         landmarks with colour
 ///   trajectory.png  the way flown, seen from above
+///   groundtruth.txt the true poses, where the source knows them (TUM format)
 ///   run.json        effective options, counts, times of every stage, memory
 class RunFolder {
  public:
@@ -42,8 +43,5 @@ class RunFolder {
 /// The contents of run.json.
 std::string run_report(const Slam& slam, const RunSummary& summary, const FrameSource& source,
                        const RunDescription& description);
-
-/// Writes text to a file. Throws OutputError if it cannot be written in full.
-void write_text(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace roslam

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace roslam {
+
+enum class FlightPath {
+  kStreet,  ///< 50 m along a street
+  kLoop,    ///< around a block of houses, a few metres further than the start
+  kHover,   ///< two full turns on the spot
+  kTurn,    ///< along a street, round a corner, along the next
+};
+enum class TrafficLevel { kNone, kLight, kHeavy };
+enum class DepthModel {
+  kIdeal,  ///< exact
+  kD455,   ///< as an Intel RealSense D455 would measure it
+};
+
+// The names the command line knows them by; nothing for a name that is none of them.
+std::optional<FlightPath> flight_path_from(std::string_view name);
+std::optional<TrafficLevel> traffic_level_from(std::string_view name);
+std::optional<DepthModel> depth_model_from(std::string_view name);
+
+struct SimulatorOptions {
+  FlightPath path = FlightPath::kStreet;
+  TrafficLevel traffic = TrafficLevel::kLight;
+  DepthModel depth = DepthModel::kD455;
+  std::size_t frames = 0;     ///< how many to give; 0 or more than the flight has: the whole flight
+  std::uint32_t seed = 1;     ///< of the city, who is in it, the sway of the drone and the noise
+  double fps = 30.0;          ///< frames a second
+  double speed = 1.0;         ///< of the flight, metres a second
+  double altitude = 3.5;      ///< of the camera above the street, metres
+  double pitch_down = 0.26;   ///< of the camera below the horizon, radians
+  double sway = 1.0;          ///< of the drone in the air; 1 is a few centimetres and about a degree, 0 none
+  double colour_noise = 1.5;  ///< standard deviation, grey levels
+
+  /// Throws OptionsError naming the field that is out of its range.
+  void validate() const;
+};
+
+}  // namespace roslam

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/sources/simulated_source.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "roslam/error.hpp"
+#include "roslam/sources/depth_noise.hpp"
+#include "roslam/sources/simulated_city.hpp"
+#include "roslam/sources/simulated_flight.hpp"
+#include "roslam/sources/simulated_noise.hpp"
+#include "roslam/sources/simulated_renderer.hpp"
+#include "roslam/sources/simulated_traffic.hpp"
+
+namespace roslam {
+namespace {
+
+using simulation::mix;
+
+Camera camera_for(const SimulatorOptions& options) {
+  Camera camera = *camera_preset("simulated");
+  camera.fps = options.fps;
+  return camera;
+}
+
+// Rounds to bytes, with the noise of an image sensor.
+cv::Mat expose(const cv::Mat& colour, double noise, std::uint32_t seed) {
+  cv::Mat image(colour.size(), CV_8UC3);
+  const auto strength = static_cast<float>(noise);
+  for (int y = 0; y < image.rows; ++y) {
+    const auto row_seed = mix(seed, static_cast<std::uint32_t>(y));
+    const auto* from = colour.ptr<float>(y);
+    auto* to = image.ptr<std::uint8_t>(y);
+    for (int i = 0; i < 3 * image.cols; ++i) {
+      const float error = strength * simulation::normal(mix(row_seed + static_cast<std::uint32_t>(i)));
+      to[i] = static_cast<std::uint8_t>(std::clamp(from[i] + error + 0.5F, 0.0F, 255.0F));
+    }
+  }
+  return image;
+}
+
+}  // namespace
+
+struct Simulator::Impl {
+  explicit Impl(const SimulatorOptions& given)
+      : options(given),
+        camera(camera_for(given)),
+        flight(given),
+        traffic(plan, given.traffic, given.seed),
+        renderer(plan, camera, given.seed) {
+    frames = static_cast<std::size_t>(std::llround(flight.duration() * options.fps));
+    if (options.frames != 0) frames = std::min(frames, options.frames);
+  }
+
+  cv::Mat measured(const cv::Mat& depth, std::size_t index) const {
+    if (options.depth == DepthModel::kIdeal) return depth;
+    return stereo_depth(depth, camera, {}, mix(options.seed, static_cast<std::uint32_t>(index), 0xdeb7U));
+  }
+
+  SimulatorOptions options;
+  Camera camera;
+  simulation::CityPlan plan;
+  simulation::Flight flight;
+  simulation::Traffic traffic;
+  simulation::Renderer renderer;
+  std::size_t frames = 0;
+};
+
+Simulator::Simulator(const SimulatorOptions& options) {
+  options.validate();
+  impl_ = std::make_unique<Impl>(options);
+}
+
+Simulator::~Simulator() = default;
+Simulator::Simulator(Simulator&&) noexcept = default;
+Simulator& Simulator::operator=(Simulator&&) noexcept = default;
+
+std::size_t Simulator::size() const { return impl_->frames; }
+
+const Camera& Simulator::camera() const { return impl_->camera; }
+
+SE3 Simulator::T_world_camera(std::size_t index) const {
+  return impl_->flight.T_world_camera(static_cast<double>(index) / impl_->options.fps);
+}
+
+SimulatedView Simulator::render(std::size_t index, SimulatedParts parts) {
+  if (index >= impl_->frames) {
+    throw OptionsError("simulator: frame " + std::to_string(index) + " is beyond the end of the flight");
+  }
+  SimulatedView view;
+  view.frame.index = index;
+  view.frame.timestamp = static_cast<double>(index) / impl_->options.fps;
+  const SE3 pose = T_world_camera(index);
+  view.frame.T_world_camera = pose;
+  simulation::Mesh movables;
+  impl_->traffic.add_to(movables, view.frame.timestamp, pose);
+  impl_->renderer.set_movables(std::move(movables));
+  const simulation::Picture picture = impl_->renderer.draw(pose);
+  const auto noise_seed = mix(impl_->options.seed, static_cast<std::uint32_t>(index), 0xca3e7aU);
+  view.frame.colour = expose(picture.colour, impl_->options.colour_noise, noise_seed);
+  view.frame.depth = impl_->measured(picture.depth, index);
+  view.frame.labels = picture.labels;
+  view.instances = picture.instances;
+  if (parts == SimulatedParts::kBackground) {
+    const simulation::Picture background = impl_->renderer.without_movables(pose, picture);
+    view.background_colour = expose(background.colour, impl_->options.colour_noise, noise_seed);
+    view.background_depth = impl_->measured(background.depth, index);
+  }
+  return view;
+}
+
+std::optional<Frame> SimulatedSource::next() {
+  if (index_ >= simulator_.size()) return std::nullopt;
+  return simulator_.render(index_++).frame;
+}
+
+}  // namespace roslam
