@@ -145,7 +145,12 @@ std::string section_of(const BenchmarkedSequence& sequence) {
   return text.str();
 }
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+// Counts without a point, what is not known as null.
+Json number(double value) {
+  if (!std::isfinite(value)) return nullptr;
+  if (value == std::trunc(value) && std::abs(value) < 1e15) return static_cast<std::int64_t>(value);
+  return value;
+}
 
 Json json_of(const BenchmarkRun& run) {
   Json json{{"folder", run.folder}, {"interrupted", run.is_interrupted}};

@@ -65,15 +65,18 @@ std::optional<bool> whether_runs_repeat(const BenchmarkedSequence& sequence) {
 // Nothing if no run has a trajectory.
 cv::Mat figure_of(const BenchmarkedSequence& sequence) {
   const WorldUp up = sequence.sequence.is_simulated() ? WorldUp::kZ : WorldUp::kUnknown;
-  const auto runs = sequence.complete_runs();
+  const Trajectory* truth = nullptr;
   std::vector<NamedTrajectoryError> curves;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
+  for (std::size_t i = 0; i < sequence.runs.size(); ++i) {
+    const BenchmarkRun& run = sequence.runs[i];
     // Runs that repeat would lie on top of each other; one alone is drawn in more detail.
     if (sequence.repeats.value_or(false) && !curves.empty()) break;
-    if (runs[i]->error) curves.push_back({"run " + std::to_string(i + 1), *runs[i]->error});
+    if (!run.is_complete() || !run.error) continue;
+    curves.push_back({"run " + std::to_string(i + 1), *run.error});
+    truth = &run.truth;
   }
-  if (!curves.empty()) return plot_trajectory_errors(runs.front()->truth, curves, up);
-  for (const auto* run : runs) {
+  if (truth != nullptr) return plot_trajectory_errors(*truth, curves, up);
+  for (const auto* run : sequence.complete_runs()) {
     if (!run->trajectory.empty()) return plot_trajectory(run->trajectory, sequence.sequence.name, up);
   }
   return {};
