@@ -73,6 +73,55 @@ INSTANTIATE_TEST_SUITE_P(Slam, RealSequence,
                          testing::Values(std::make_tuple("fr1_rpy", "tum-fr1", 0.030),
                                          std::make_tuple("kitchen", "7scenes", 0.052)));
 
+// Frames rendered beforehand, so that they come as fast as a camera's.
+class RecordedSource : public FrameSource {
+ public:
+  explicit RecordedSource(std::size_t frames) {
+    SimulatorOptions options;
+    options.traffic = TrafficLevel::kNone;
+    options.frames = frames;
+    SimulatedSource source(options);
+    camera_ = source.camera();
+    while (auto frame = source.next()) frames_.push_back(*frame);
+  }
+  std::optional<Frame> next() override {
+    return position_ < frames_.size() ? std::make_optional(frames_[position_++]) : std::nullopt;
+  }
+  const Camera& camera() const override { return camera_; }
+  void rewind() { position_ = 0; }
+
+ private:
+  Camera camera_;
+  std::vector<Frame> frames_;
+  std::size_t position_ = 0;
+};
+
+TEST(Slam, RealTimeModeAccountsForEveryFrame) {
+  RecordedSource source(40);
+  Slam slam(source.camera(), {}, Mode::kRealTime);
+  const RunSummary summary = run(source, slam);
+  EXPECT_EQ(slam.frames() + summary.dropped, 40U);
+  EXPECT_EQ(slam.trajectory().size(), slam.frames());
+  EXPECT_GT(summary.wall_seconds, 39.0 / 30.0 - 0.01) << "frames must not come earlier than their timestamps say";
+  EXPECT_LT(evaluate_trajectory(summary.truth, slam.trajectory()).ate.rmse, 0.05);
+}
+
+TEST(Slam, StopsWhenAskedAndKeepsWhatThereIs) {
+  RecordedSource source(30);
+  for (const Mode mode : {Mode::kDeterministic, Mode::kRealTime}) {
+    source.rewind();
+    Slam slam(source.camera(), {}, mode);
+    std::stop_source stop;
+    const auto stop_after_ten = [&](const FrameResult& frame) {
+      if (frame.index >= 9) stop.request_stop();
+    };
+    const RunSummary summary = run(source, slam, stop_after_ten, stop.get_token());
+    EXPECT_TRUE(summary.interrupted);
+    EXPECT_LE(slam.frames(), 12U);
+    EXPECT_EQ(slam.trajectory().size(), slam.frames());
+  }
+}
+
 TEST(Slam, RefusesAbsurdCalibrationAndOptions) {
   Camera camera;
   camera.fx = -1.0;
