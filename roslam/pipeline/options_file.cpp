@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <yaml-cpp/yaml.h>
 
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -77,11 +78,13 @@ Options read_options(const std::filesystem::path& file) {
   const YAML::Node& readable = root;  // so that asking for an absent section does not create it
   for_each_option(options, [&](const char* section, const char* key, auto& field) {
     if (!readable[section] || !readable[section].IsMap() || !readable[section][key]) return;
+    const std::string name = file.string() + ": '" + section + "." + key + "'";
     try {
       field = readable[section][key].template as<std::decay_t<decltype(field)>>();
     } catch (const YAML::Exception&) {
-      throw OptionsError(file.string() + ": '" + section + "." + key + "' has a value of the wrong type");
+      throw OptionsError(name + " has a value of the wrong type");
     }
+    if (!std::isfinite(static_cast<double>(field))) throw OptionsError(name + " must be a finite number");
   });
   try {
     options.validate();
