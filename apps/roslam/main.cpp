@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <exception>
 #include <iostream>
+#include <new>
+#include <string>
 
 #include "apps/roslam/commands.hpp"
 #include "roslam/error.hpp"
@@ -8,6 +11,13 @@
 namespace {
 constexpr int kInputError = 1;
 constexpr int kUsageError = 2;
+
+// Scripts read one line; messages of other libraries may hold several.
+std::string one_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -23,8 +33,11 @@ int main(int argc, char** argv) {
     return 0;
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? 0 : kUsageError;
+  } catch (const std::bad_alloc&) {
+    std::cerr << "error: out of memory; close other programs or use smaller images\n";
+    return kInputError;
   } catch (const std::exception& error) {
-    std::cerr << "error: " << error.what() << "\n";
+    std::cerr << "error: " << one_line(error.what()) << "\n";
     return kInputError;
   }
 }

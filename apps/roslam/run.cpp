@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -27,19 +30,35 @@ struct RunArguments {
   bool json = false;
 };
 
-void require_frames(const Slam& slam, const FrameSource& source, const std::string& name) {
-  if (slam.frames() > 0) return;
-  std::string reasons;
-  for (const auto& [reason, count] : source.skipped()) reasons += "; " + std::to_string(count) + " x " + reason;
-  for (const auto& [reason, count] : slam.rejected()) reasons += "; " + std::to_string(count) + " x " + reason;
-  throw InputError(name + ": no frame could be used" + reasons);
+std::string in_words(const std::map<std::string, std::size_t>& counts) {
+  std::string all;
+  for (const auto& [reason, count] : counts) all += "; " + std::to_string(count) + " x " + reason;
+  return all;
+}
+
+// A run without a single pose is no success, whatever was written.
+void require_poses(const Slam& slam, const RunSummary& summary, const FrameSource& source, const std::string& name) {
+  if (summary.interrupted || !slam.trajectory().empty()) return;
+  const std::string skipped = in_words(source.skipped()) + in_words(slam.rejected());
+  if (slam.frames() == 0) {
+    throw InputError(name + ": no frame could be used" + skipped + "; check the images and --camera");
+  }
+  const std::string reasons = skipped + in_words(source.skipped_depth());
+  if (summary.without_depth == slam.frames()) {
+    throw InputError(name + ": no frame could be tracked, none has depth" + reasons +
+                     "; RGB-D tracking needs depth images, 16 bit, within 20 ms of the colour images");
+  }
+  throw InputError(name + ": no frame could be tracked" + reasons + "; tracking starts at an image with " +
+                   std::to_string(slam.options().tracker.min_initial_points) +
+                   " corners of known depth: check the images and depth_units_per_metre of the camera");
 }
 
 void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder& folder) {
   const auto times = slam.times().summary();
   const std::size_t tracked = slam.trajectory().size();
-  std::printf("tracked %zu of %zu frames (%.1f %%), %zu dropped\n", tracked, slam.frames(),
-              100.0 * static_cast<double>(tracked) / static_cast<double>(slam.frames()), summary.dropped);
+  std::printf("tracked %zu of %zu frames (%.1f %%), %zu dropped%s\n", tracked, slam.frames(),
+              100.0 * static_cast<double>(tracked) / static_cast<double>(std::max<std::size_t>(slam.frames(), 1)),
+              summary.dropped, summary.interrupted ? ", interrupted" : "");
   std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(), slam.map().landmark_count());
   if (const auto found = times.find("tracking"); found != times.end()) {
     std::printf("tracking: median %.1f ms, p95 %.1f ms of processor time a frame\n", found->second.median_ms,
@@ -48,10 +67,17 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
   std::printf("results: %s\n", folder.path().c_str());
 }
 
+void require_written_output() {
+  if (std::fflush(stdout) != 0 || !std::cout.flush()) {
+    throw OutputError("stdout: cannot be written in full; check the disk or the pipe");
+  }
+}
+
 void execute(const RunArguments& arguments, const std::string& version) {
   const Options options = arguments.config.empty() ? Options{} : read_options(arguments.config);
   if (arguments.print_config) {
     std::cout << options_to_yaml(options);
+    require_written_output();
     return;
   }
   if (arguments.source.name.empty()) throw CLI::RequiredError("SOURCE");
@@ -69,12 +95,14 @@ void execute(const RunArguments& arguments, const std::string& version) {
   }
   const RunDescription description{arguments.source.name, arguments.source.camera, version};
   folder.write(slam, summary, *source, description);
-  require_frames(slam, *source, arguments.source.name);
+  if (summary.failure) std::rethrow_exception(summary.failure);
+  require_poses(slam, summary, *source, arguments.source.name);
   if (arguments.json) {
     std::cout << nlohmann::json::parse(run_report(slam, summary, *source, description)).dump() << "\n";
   } else {
     print_summary(slam, summary, folder);
   }
+  require_written_output();
 }
 }  // namespace
 
@@ -86,7 +114,8 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "  roslam run simulated:street --out street\n"
       "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n"
       "  roslam run my_flight --camera my_camera.yaml --real-time --out live\n"
-      "RUN then holds trajectory.txt and keyframes.txt (TUM format), map.ply, trajectory.png and run.json.");
+      "RUN then holds trajectory.txt and keyframes.txt (TUM format), map.ply, trajectory.png and run.json.\n"
+      "Ctrl-C ends the run early and writes what was computed so far (exit code 0, \"interrupted\" in run.json).");
   command->add_option("SOURCE", arguments->source.name,
                       "A folder in TUM RGB-D format, or simulated:street, simulated:loop, simulated:hover, "
                       "simulated:turn");

@@ -61,8 +61,12 @@ void reject_unknown_keys(const std::filesystem::path& path, const YAML::Node& no
   const std::set<std::string> known{"model", "width", "height",     "fx",
                                     "fy",    "cx",    "cy",         "distortion",
                                     "fps",   "depth_units_per_metre"};
+  std::set<std::string> seen;
   for (const auto& entry : node) {
-    const auto key = entry.first.as<std::string>();
+    if (!entry.first.IsScalar()) throw InputError(path.string() + ": a key must be a word; write 'key: value' lines");
+    const std::string& key = entry.first.Scalar();
+    // YAML readers take one of two equal keys without a word.
+    if (!seen.insert(key).second) throw InputError(path.string() + ": '" + key + "' is given twice; remove one");
     if (!known.contains(key)) {
       throw InputError(path.string() + ": unknown key '" + key + "'; known: model width height fx fy cx cy " +
                        "distortion depth_units_per_metre fps");
@@ -90,7 +94,7 @@ Camera read_camera(const std::filesystem::path& file) {
   } catch (const YAML::BadFile&) {
     throw InputError(file.string() + ": cannot open the camera file; give a YAML file or a preset (" +
                      joined(camera_preset_names()) + ")");
-  } catch (const YAML::Exception& error) {
+  } catch (const std::exception& error) {  // of YAML, or of the stream where the file is a folder
     throw InputError(file.string() + ": not a valid YAML file: " + error.what());
   }
   if (!node.IsMap()) throw InputError(file.string() + ": a camera file holds 'key: value' lines");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <yaml-cpp/yaml.h>
 
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -26,10 +27,22 @@ std::string joined(const auto& names, const auto& name_of) {
   return all;
 }
 
+std::string word_of(const std::filesystem::path& file, const YAML::Node& key) {
+  if (!key.IsScalar()) throw OptionsError(file.string() + ": a key must be a word; write 'key: value' lines");
+  return key.Scalar();
+}
+
+// YAML readers take one of two equal keys without a word.
+void reject_repeated(const std::filesystem::path& file, std::set<std::string>& seen, const std::string& key) {
+  if (!seen.insert(key).second) throw OptionsError(file.string() + ": '" + key + "' is given twice; remove one");
+}
+
 void reject_unknown_keys(const std::filesystem::path& file, const YAML::Node& root) {
   const Keys known = known_keys();
+  std::set<std::string> seen;
   for (const auto& section : root) {
-    const auto name = section.first.as<std::string>();
+    const auto name = word_of(file, section.first);
+    reject_repeated(file, seen, name);
     const auto found = known.find(name);
     if (found == known.end()) {
       throw OptionsError(file.string() + ": unknown section '" + name + "'; known: " +
@@ -38,7 +51,8 @@ void reject_unknown_keys(const std::filesystem::path& file, const YAML::Node& ro
     if (section.second.IsNull()) continue;
     if (!section.second.IsMap()) throw OptionsError(file.string() + ": '" + name + "' must hold 'key: value' lines");
     for (const auto& entry : section.second) {
-      const auto key = entry.first.as<std::string>();
+      const auto key = word_of(file, entry.first);
+      reject_repeated(file, seen, name + "." + key);
       if (!found->second.contains(key)) {
         throw OptionsError(file.string() + ": unknown key '" + name + "." + key + "'; known: " +
                            joined(found->second, [](const auto& k) { return k; }));
@@ -54,7 +68,7 @@ Options read_options(const std::filesystem::path& file) {
     root = YAML::LoadFile(file.string());
   } catch (const YAML::BadFile&) {
     throw InputError(file.string() + ": cannot open the configuration file; roslam run --print-config shows one");
-  } catch (const YAML::Exception& error) {
+  } catch (const std::exception& error) {  // of YAML, or of the stream where the file is a folder
     throw InputError(file.string() + ": not a valid YAML file: " + error.what());
   }
   Options options;
@@ -64,11 +78,13 @@ Options read_options(const std::filesystem::path& file) {
   const YAML::Node& readable = root;  // so that asking for an absent section does not create it
   for_each_option(options, [&](const char* section, const char* key, auto& field) {
     if (!readable[section] || !readable[section].IsMap() || !readable[section][key]) return;
+    const std::string name = file.string() + ": '" + section + "." + key + "'";
     try {
       field = readable[section][key].template as<std::decay_t<decltype(field)>>();
     } catch (const YAML::Exception&) {
-      throw OptionsError(file.string() + ": '" + section + "." + key + "' has a value of the wrong type");
+      throw OptionsError(name + " has a value of the wrong type");
     }
+    if (!std::isfinite(static_cast<double>(field))) throw OptionsError(name + " must be a finite number");
   });
   try {
     options.validate();

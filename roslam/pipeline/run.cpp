@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/pipeline/run.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
@@ -38,18 +39,16 @@ class PacedReader {
  private:
   void read(FrameSource& source, const std::stop_token& stop) {
     try {
-      std::optional<Clock::time_point> start;
-      double first_timestamp = 0.0;
+      auto due = Clock::now();
+      std::optional<double> last_timestamp;
       while (!stop.stop_requested()) {
         auto frame = source.next();
         if (!frame) break;
-        if (!start) {
-          start = Clock::now();
-          first_timestamp = frame->timestamp;
-        }
-        const std::chrono::duration<double> age(frame->timestamp - first_timestamp);
+        // The clock starts when the first frame is there, however long the source took to open.
+        due = last_timestamp ? due + pause(*last_timestamp, frame->timestamp) : Clock::now();
+        last_timestamp = frame->timestamp;
         std::unique_lock lock(mutex_);
-        tick_.wait_until(lock, stop, *start + std::chrono::duration_cast<Clock::duration>(age), [] { return false; });
+        tick_.wait_until(lock, stop, due, [] { return false; });
         if (stop.stop_requested()) break;
         dropped_ += queue_.push(std::move(*frame));
       }
@@ -57,6 +56,12 @@ class PacedReader {
       failure_ = std::current_exception();
     }
     queue_.close();
+  }
+
+  // A recording with a gap of hours must not make the program seem to hang.
+  static Clock::duration pause(double from, double to) {
+    constexpr double kLongest = 1.0;  // seconds
+    return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::clamp(to - from, 0.0, kLongest)));
   }
 
   BoundedQueue<Frame> queue_;
@@ -71,10 +76,51 @@ class Runner {
  public:
   Runner(Slam& slam, const std::function<void(const FrameResult&)>& on_frame) : slam_(slam), on_frame_(on_frame) {}
 
+  void follow(FrameSource& source, const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      const auto frame = source.next();
+      if (!frame) return;
+      process(*frame);
+    }
+    summary_.interrupted = true;
+  }
+
+  void follow_in_real_time(FrameSource& source, const std::stop_token& stop) {
+    PacedReader reader(source, static_cast<std::size_t>(slam_.options().threads.frame_queue));
+    const std::stop_callback forward(stop, [&] { reader.stop(); });
+    while (!stop.stop_requested()) {
+      const auto frame = reader.next();
+      summary_.dropped = reader.dropped();
+      if (!frame) break;
+      process(*frame);
+    }
+    summary_.interrupted = stop.stop_requested();
+  }
+
+  // Runs a step; what it throws is kept for the summary.
+  template <typename Step>
+  void attempt(const Step& step) {
+    try {
+      step();
+    } catch (...) {
+      if (!summary_.failure) summary_.failure = std::current_exception();
+    }
+  }
+
+  RunSummary finish() {
+    attempt([&] { slam_.finish(); });
+    summary_.wall_seconds = seconds_since(start_);
+    return summary_;
+  }
+
+ private:
   void process(const Frame& frame) {
     const auto result = slam_.process(frame);
     if (!result) return;
-    if (frame.T_world_camera) summary_.truth.push_back({frame.timestamp, *frame.T_world_camera});
+    if (frame.depth.empty()) ++summary_.without_depth;
+    if (frame.T_world_camera && frame.T_world_camera->is_finite()) {
+      summary_.truth.push_back({frame.timestamp, *frame.T_world_camera});
+    }
     if (summary_.first_pose_seconds < 0.0 && result->T_world_camera) {
       summary_.first_pose_seconds = seconds_since(start_);
       if (const double age = process_age(); age >= 0.0) summary_.start_up_seconds = age;
@@ -82,15 +128,6 @@ class Runner {
     if (on_frame_) on_frame_(*result);
   }
 
-  RunSummary finish() {
-    slam_.finish();
-    summary_.wall_seconds = seconds_since(start_);
-    return summary_;
-  }
-
-  RunSummary& summary() { return summary_; }
-
- private:
   Slam& slam_;
   const std::function<void(const FrameResult&)>& on_frame_;
   Clock::time_point start_ = Clock::now();
@@ -101,25 +138,9 @@ class Runner {
 RunSummary run(FrameSource& source, Slam& slam, const std::function<void(const FrameResult&)>& on_frame,
                const std::stop_token& stop) {
   Runner runner(slam, on_frame);
-  if (slam.mode() == Mode::kDeterministic) {
-    while (!stop.stop_requested()) {
-      const auto frame = source.next();
-      if (!frame) return runner.finish();
-      runner.process(*frame);
-    }
-    runner.summary().interrupted = true;
-    return runner.finish();
-  }
-  PacedReader reader(source, static_cast<std::size_t>(slam.options().threads.frame_queue));
-  const std::stop_callback forward(stop, [&] { reader.stop(); });
-  while (!stop.stop_requested()) {
-    const auto frame = reader.next();
-    if (!frame) break;
-    runner.process(*frame);
-  }
-  reader.stop();
-  runner.summary().interrupted = stop.stop_requested();
-  runner.summary().dropped = reader.dropped();
+  runner.attempt([&] {
+    slam.mode() == Mode::kDeterministic ? runner.follow(source, stop) : runner.follow_in_real_time(source, stop);
+  });
   return runner.finish();
 }
 

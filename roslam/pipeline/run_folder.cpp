@@ -12,11 +12,39 @@
 
 namespace roslam {
 
+namespace {
+struct Result {
+  const char* file;
+  std::function<void(const std::filesystem::path&)> write;
+  bool is_there = true;  // false: this run has no such result
+};
+
+// The result of an earlier run must not pass for one of this run.
+void remove_old(const std::filesystem::path& file) {
+  std::error_code error;
+  std::filesystem::remove(file, error);
+  if (error) throw OutputError(file.string() + ": left by an earlier run and cannot be removed; choose another --out");
+}
+
+void write_one(const Result& result, const std::filesystem::path& file) {
+  try {
+    result.is_there ? result.write(file) : remove_old(file);
+  } catch (const OutputError&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw OutputError(file.string() + ": cannot be written: " + error.what());
+  }
+}
+}  // namespace
+
 RunFolder::RunFolder(const std::filesystem::path& path) : path_(path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
-  if (error || !std::filesystem::is_directory(path)) {
+  if (error || !std::filesystem::is_directory(path, error)) {
     throw OutputError(path.string() + ": cannot create the output folder; choose another --out");
+  }
+  if (std::filesystem::exists(path / "rgb.txt", error)) {
+    throw OutputError(path.string() + ": is a dataset, whose ground truth results could replace; choose another --out");
   }
   const auto probe = path / "run.json";
   write_file(probe, "{}\n");
@@ -24,23 +52,22 @@ RunFolder::RunFolder(const std::filesystem::path& path) : path_(path) {
 
 void RunFolder::write(const Slam& slam, const RunSummary& summary, const FrameSource& source,
                       const RunDescription& description) const {
-  const std::vector<std::function<void()>> writers{
-      [&] { write_file(path_ / "run.json", run_report(slam, summary, source, description)); },
-      [&] { write_trajectory(path_ / "trajectory.txt", slam.trajectory()); },
-      [&] { write_trajectory(path_ / "keyframes.txt", slam.keyframes()); },
-      [&] {
-        if (!summary.truth.empty()) write_trajectory(path_ / "groundtruth.txt", summary.truth);
-      },
-      [&] {
-        const Trajectory trajectory = slam.trajectory();
-        if (!trajectory.empty()) write_png(path_ / "trajectory.png", plot_trajectory(trajectory, "RO-SLAM", WorldUp::kZ));
-      },
-      [&] { write_map_ply(path_ / "map.ply", slam.map()); },
+  using Path = std::filesystem::path;
+  const Trajectory trajectory = slam.trajectory();
+  const std::vector<Result> results{
+      {"trajectory.txt", [&](const Path& file) { write_trajectory(file, trajectory); }},
+      {"keyframes.txt", [&](const Path& file) { write_trajectory(file, slam.keyframes()); }},
+      {"run.json", [&](const Path& file) { write_file(file, run_report(slam, summary, source, description)); }},
+      {"groundtruth.txt", [&](const Path& file) { write_trajectory(file, summary.truth); }, !summary.truth.empty()},
+      {"trajectory.png",
+       [&](const Path& file) { write_png(file, plot_trajectory(trajectory, "RO-SLAM", WorldUp::kZ)); },
+       !trajectory.empty()},
+      {"map.ply", [&](const Path& file) { write_map_ply(file, slam.map()); }},
   };
   std::exception_ptr first_failure;
-  for (const auto& write_one : writers) {
+  for (const auto& result : results) {
     try {
-      write_one();
+      write_one(result, path_ / result.file);
     } catch (const OutputError&) {
       if (!first_failure) first_failure = std::current_exception();
     }

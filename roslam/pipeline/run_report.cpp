@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <exception>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "roslam/pipeline/run_folder.hpp"
@@ -26,6 +28,13 @@ Json camera_json(const Camera& camera) {
           {"fps", camera.fps}};
 }
 
+Json counts_json(const std::map<std::string, std::size_t>& counts) {
+  Json json = Json::object();
+  for (const auto& [reason, count] : counts) json[reason] = count;
+  return json;
+}
+
+// in_source = processed + dropped + all skipped, unless the run ended early.
 Json frames_json(const Slam& slam, const RunSummary& summary, const FrameSource& source) {
   std::size_t tracked = 0;
   Json by_state = Json::object();
@@ -34,8 +43,7 @@ Json frames_json(const Slam& slam, const RunSummary& summary, const FrameSource&
     if (state == TrackingState::kTracking) tracked = count;
   }
   std::size_t rejected = 0;
-  Json skipped = Json::object();
-  for (const auto& [reason, count] : source.skipped()) skipped[reason] = count;
+  Json skipped = counts_json(source.skipped());
   for (const auto& [reason, count] : slam.rejected()) {
     skipped[reason] = skipped.value(reason, std::size_t{0}) + count;
     rejected += count;
@@ -47,7 +55,20 @@ Json frames_json(const Slam& slam, const RunSummary& summary, const FrameSource&
           {"tracked_share", slam.frames() == 0 ? 0.0 : static_cast<double>(tracked) / static_cast<double>(slam.frames())},
           {"dropped", summary.dropped},
           {"by_state", by_state},
-          {"skipped", skipped}};
+          {"skipped", skipped},
+          {"without_depth", summary.without_depth},
+          {"skipped_depth", counts_json(source.skipped_depth())}};
+}
+
+Json failure_json(const std::exception_ptr& failure) {
+  if (!failure) return nullptr;
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& error) {
+    return error.what();
+  } catch (...) {
+    return "unknown";
+  }
 }
 
 Json times_json(const StageTimes& times) {
@@ -78,6 +99,7 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   json["source"] = description.source;
   json["mode"] = slam.mode() == Mode::kDeterministic ? "deterministic" : "real-time";
   json["interrupted"] = summary.interrupted;
+  json["error"] = failure_json(summary.failure);
   json["frames"] = frames_json(slam, summary, source);
   json["keyframes"] = slam.map().keyframe_count();
   json["landmarks"] = slam.map().landmark_count();
@@ -91,7 +113,8 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   json["camera"] = camera_json(slam.camera());
   json["camera"]["name"] = description.camera;
   json["options"] = Json::parse(options_to_json(slam.options()));
-  return json.dump(2) + "\n";
+  // File names may hold bytes that are no UTF-8: shown as a replacement character rather than refused.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace roslam

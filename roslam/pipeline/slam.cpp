@@ -66,13 +66,16 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
 }
 
 bool Slam::is_usable(const Frame& frame) {
-  const auto reject = [&](const char* reason) {
+  const auto reject = [&](const std::string& reason) {
     ++rejected_[reason];
     return false;
   };
   const cv::Size size(camera_.width, camera_.height);
-  if (frame.colour.size() != size || frame.colour.type() != CV_8UC3) return reject("colour image size differs from the camera's");
-  if (!frame.depth.empty() && (frame.depth.size() != size || frame.depth.type() != CV_32FC1)) {
+  if (frame.colour.empty()) return reject("no colour image");
+  if (frame.colour.type() != CV_8UC3) return reject("colour image is not 8-bit BGR");
+  if (frame.colour.size() != size) return reject("colour image size differs from the camera's");
+  if (!frame.depth.empty() && frame.depth.type() != CV_32FC1) return reject("depth image is not 32-bit float");
+  if (!frame.depth.empty() && frame.depth.size() != size) {
     return reject("depth image size differs from the colour image's");
   }
   if (!std::isfinite(frame.timestamp)) return reject("time is not a number");

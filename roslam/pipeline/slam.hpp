@@ -41,7 +41,7 @@ class Slam {
 
   /// Tracks a frame and, if it becomes a keyframe, maps it (in real-time mode: on another thread). mask: empty, or
   /// CV_8UC1 of the frame's size, nonzero where nothing may be used (things that can move). Frames that cannot be
-  /// used (wrong size, time not increasing) give nothing and are counted.
+  /// used (wrong size or type, time not increasing) give nothing and are counted.
   std::optional<FrameResult> process(const Frame& frame, const cv::Mat& mask = {});
 
   /// Waits for the mapper. Call before reading results.

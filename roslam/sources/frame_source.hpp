@@ -36,11 +36,14 @@ class FrameSource {
 
   virtual const Camera& camera() const = 0;
 
-  /// Number of frames the source will give at most, where it is known.
+  /// Number of frames in the source, those that will be skipped included, where it is known.
   virtual std::optional<std::size_t> size() const { return std::nullopt; }
 
   /// Frames skipped so far, by reason in words.
   virtual std::map<std::string, std::size_t> skipped() const { return {}; }
+
+  /// Depth images that could not be used so far, by reason in words; their frames came without depth.
+  virtual std::map<std::string, std::size_t> skipped_depth() const { return {}; }
 };
 
 }  // namespace roslam

@@ -21,9 +21,16 @@ bool is_complete(const std::vector<char>& bytes) {
 }
 
 ImageFile read_image(const std::filesystem::path& file, int flags) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) return {{}, "is missing"};
   std::ifstream in(file, std::ios::binary);
-  if (!in) return {{}, "is missing"};
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(in), {}};
+  std::vector<char> bytes;
+  try {  // a folder opens like a file and fails when read, as does a bad disk
+    bytes.assign(std::istreambuf_iterator<char>(in), {});
+  } catch (const std::ios_base::failure&) {
+    return {{}, "cannot be read"};
+  }
+  if (!in) return {{}, "cannot be read"};
   if (bytes.empty() || !is_complete(bytes)) return {{}, "is truncated"};
   cv::Mat image;
   try {

@@ -2,9 +2,15 @@
 #include "roslam/sources/tum_source.hpp"
 
 #include <algorithm>
+#include <cctype>
+#include <charconv>
 #include <cmath>
 #include <fstream>
+#include <iterator>
+#include <limits>
 #include <sstream>
+#include <string_view>
+#include <utility>
 
 #include "roslam/error.hpp"
 #include "roslam/sources/image_file.hpp"
@@ -12,40 +18,88 @@
 namespace roslam {
 
 namespace {
-std::vector<TimedFile> read_list(const std::filesystem::path& list) {
-  std::ifstream in(list);
-  if (!in) {
-    throw InputError(list.string() + ": cannot open it; a TUM RGB-D folder holds rgb.txt, depth.txt and the images "
-                     "they name");
-  }
+struct List {
   std::vector<TimedFile> entries;
-  std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (line.find_first_not_of(" \t") == std::string::npos || line[line.find_first_not_of(" \t")] == '#') continue;
-    std::istringstream fields(line);
-    TimedFile entry;
-    std::string file;
-    if (!(fields >> entry.timestamp >> file) || !std::isfinite(entry.timestamp)) {
-      throw InputError(list.string() + ":" + std::to_string(number) + ": expected 'timestamp file', got '" + line +
-                       "'");
-    }
-    entry.file = file;
-    entries.push_back(entry);
-  }
-  if (entries.empty()) throw InputError(list.string() + ": names no image; is the dataset complete?");
-  return entries;
+  std::size_t without_time = 0;  // lines whose time is not a number
+};
+
+// A line as an error message can show it: short, and on one line whatever the file holds.
+std::string excerpt(const std::string& line) {
+  constexpr std::size_t kLength = 60;
+  std::string shown = line.substr(0, kLength);
+  std::replace_if(shown.begin(), shown.end(), [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; }, '?');
+  return line.size() > kLength ? shown + "..." : shown;
 }
 
-// Drops entries that do not come later than the one before, and says how many.
-std::size_t drop_out_of_order(std::vector<TimedFile>& entries) {
-  const std::size_t before = entries.size();
-  std::vector<TimedFile> kept;
-  for (const auto& entry : entries) {
-    if (kept.empty() || entry.timestamp > kept.back().timestamp) kept.push_back(entry);
+// std::from_chars, unlike streams, does not depend on the locale and reads "nan" and "inf".
+std::optional<double> parse_time(const std::string& word) {
+  double time = 0.0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), time);
+  if (end != word.data() + word.size()) return std::nullopt;
+  if (error == std::errc::result_out_of_range) return std::numeric_limits<double>::quiet_NaN();
+  return error == std::errc() ? std::make_optional(time) : std::nullopt;
+}
+
+List read_list(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  if (!in || std::filesystem::is_directory(file)) {
+    throw InputError(file.string() + ": cannot open it; a TUM RGB-D folder holds rgb.txt, depth.txt and the images "
+                     "they name");
   }
-  entries = kept;
-  return before - kept.size();
+  List list;
+  std::string line;
+  for (std::size_t number = 1; std::getline(in, line); ++number) {
+    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // some editors put it before the first line
+    if (number == 1 && line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
+    std::istringstream fields(line);
+    std::string time_word;
+    std::string image;
+    fields >> time_word >> image;
+    if (time_word.empty() || time_word.front() == '#') continue;
+    const auto time = parse_time(time_word);
+    if (!time || image.empty()) {
+      throw InputError(file.string() + ":" + std::to_string(number) + ": expected 'timestamp file', got '" +
+                       excerpt(line) + "'; correct or remove the line");
+    }
+    if (std::isfinite(*time)) {
+      list.entries.push_back({*time, image});
+    } else {
+      ++list.without_time;
+    }
+  }
+  if (list.entries.empty()) throw InputError(file.string() + ": names no image; is the dataset complete?");
+  return list;
+}
+
+// Drops as few entries as leave the times strictly increasing, and says how many. Keeping each entry that comes later
+// than the one before would not do: a single time far in the future would cost all that follow.
+std::size_t drop_out_of_order(std::vector<TimedFile>& entries) {
+  // Longest increasing subsequence: last_of[n] ends the one of n + 1 entries that ends earliest in time.
+  std::vector<std::size_t> last_of;
+  std::vector<std::size_t> before(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const auto at = std::lower_bound(last_of.begin(), last_of.end(), entries[i].timestamp,
+                                     [&](std::size_t e, double time) { return entries[e].timestamp < time; });
+    if (at != last_of.begin()) before[i] = *std::prev(at);
+    if (at == last_of.end()) {
+      last_of.push_back(i);
+    } else if (entries[*at].timestamp > entries[i].timestamp) {  // of equal times the first stays
+      *at = i;
+    }
+  }
+  std::vector<TimedFile> kept(last_of.size());
+  for (std::size_t n = kept.size(), i = last_of.back(); n > 0; i = before[i]) kept[--n] = entries[i];
+  const std::size_t dropped = entries.size() - kept.size();
+  entries = std::move(kept);
+  return dropped;
+}
+
+std::string size_in_words(const cv::Size& size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+void count(std::map<std::string, std::size_t>& counts, const char* reason, std::size_t number) {
+  if (number > 0) counts[reason] += number;
 }
 }  // namespace
 
@@ -95,10 +149,15 @@ TumSource::TumSource(const std::filesystem::path& folder, const Camera& camera, 
   if (!std::filesystem::is_directory(folder)) {
     throw InputError(folder.string() + ": no such folder; give a TUM RGB-D dataset or simulated:street");
   }
-  colour_ = read_list(folder / "rgb.txt");
-  depth_ = read_list(folder / "depth.txt");
-  if (const auto dropped = drop_out_of_order(colour_)) skipped_["colour image out of the order of time"] = dropped;
-  if (const auto dropped = drop_out_of_order(depth_)) skipped_["depth image out of the order of time"] = dropped;
+  List colour = read_list(folder / "rgb.txt");
+  List depth = read_list(folder / "depth.txt");
+  size_ = colour.entries.size() + colour.without_time;
+  count(skipped_, "colour image without a time", colour.without_time);
+  count(skipped_, "colour image out of the order of time", drop_out_of_order(colour.entries));
+  count(skipped_depth_, "depth image without a time", depth.without_time);
+  count(skipped_depth_, "depth image out of the order of time", drop_out_of_order(depth.entries));
+  colour_ = std::move(colour.entries);
+  depth_ = std::move(depth.entries);
   depth_of_colour_ = associate(colour_, depth_, options.max_time_difference);
 }
 
@@ -115,8 +174,10 @@ std::optional<Frame> TumSource::read(std::size_t index) {
     ++skipped_["colour image " + colour.error];
     return std::nullopt;
   }
-  if (colour.image.size() != cv::Size(camera_.width, camera_.height)) {
-    ++skipped_["colour image size differs from the camera's"];
+  const cv::Size expected(camera_.width, camera_.height);
+  if (colour.image.size() != expected) {
+    ++skipped_["colour image is " + size_in_words(colour.image.size()) + " but the camera " + size_in_words(expected) +
+               " pixels"];
     return std::nullopt;
   }
   Frame frame;
@@ -129,17 +190,18 @@ std::optional<Frame> TumSource::read(std::size_t index) {
 
 cv::Mat TumSource::read_depth_for(std::size_t index, const cv::Size& colour_size) {
   if (depth_of_colour_[index] < 0) {
-    ++skipped_["no depth image near in time"];
+    ++skipped_depth_["no depth image near in time"];
     return {};
   }
   const auto& entry = depth_[static_cast<std::size_t>(depth_of_colour_[index])];
   const ImageFile depth = read_depth_image(folder_ / entry.file);
   if (!depth.error.empty()) {
-    ++skipped_["depth image " + depth.error];
+    ++skipped_depth_["depth image " + depth.error];
     return {};
   }
   if (depth.image.size() != colour_size) {
-    ++skipped_["depth image size differs from the colour image's"];
+    ++skipped_depth_["depth image is " + size_in_words(depth.image.size()) + " but the colour image " +
+                     size_in_words(colour_size) + " pixels"];
     return {};
   }
   return depth_to_metres(depth.image, camera_.depth_units_per_metre);

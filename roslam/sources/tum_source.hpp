@@ -30,7 +30,8 @@ std::vector<int> associate(const std::vector<TimedFile>& colour, const std::vect
 
 /// A folder in the TUM RGB-D format: rgb.txt, depth.txt and the images they name (PNG or JPEG; depth 16-bit).
 /// A colour image without a depth image near in time is given with an empty depth; images that are missing,
-/// truncated, of the wrong size or out of the order of time are skipped and counted.
+/// truncated, of the wrong size, without a time or out of the order of time are skipped and counted. Of images out of
+/// order as few are skipped as leave the others in order.
 class TumSource : public FrameSource {
  public:
   /// Throws InputError if the folder or a list is missing, malformed or names no image, CalibrationError if the
@@ -39,8 +40,9 @@ class TumSource : public FrameSource {
 
   std::optional<Frame> next() override;
   const Camera& camera() const override { return camera_; }
-  std::optional<std::size_t> size() const override { return colour_.size(); }
+  std::optional<std::size_t> size() const override { return size_; }
   std::map<std::string, std::size_t> skipped() const override { return skipped_; }
+  std::map<std::string, std::size_t> skipped_depth() const override { return skipped_depth_; }
 
   /// True if the folder looks like a TUM dataset.
   static bool recognises(const std::filesystem::path& folder);
@@ -55,6 +57,8 @@ class TumSource : public FrameSource {
   std::vector<TimedFile> depth_;
   std::vector<int> depth_of_colour_;
   std::map<std::string, std::size_t> skipped_;
+  std::map<std::string, std::size_t> skipped_depth_;
+  std::size_t size_ = 0;  // colour images listed
   std::size_t position_ = 0;
 };
 

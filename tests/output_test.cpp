@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Results that cannot be written, runs that are interrupted: what was computed is kept.
+#include <gtest/gtest.h>
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/mount.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <csignal>
+
+#include "tests/street.hpp"
+
+namespace roslam::street {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::array<const char*, 5> kResults{"trajectory.txt", "keyframes.txt", "map.ply", "run.json",
+                                              "trajectory.png"};
+
+class Output : public Dataset {
+ protected:
+  Outcome run_to(const std::string& out) const {
+    return run_program("run '" + data_.string() + "' --quiet --camera simulated --out '" + out + "'", scratch_);
+  }
+};
+
+TEST_F(Output, FolderThatCannotBeMadeIsNamed) {
+  put(scratch_ / "file", "not a folder");
+  for (const std::string& out : {(scratch_ / "file").string(), (scratch_ / "file/run").string(),
+                                 std::string("/proc/roslam"), std::string("/dev/null/run")}) {
+    expect_refused(run_to(out), {out, "choose another --out"});
+  }
+  EXPECT_EQ(content(scratch_ / "file"), "not a folder");
+}
+
+TEST_F(Output, DatasetIsNotWrittenInto) {
+  put(data_ / "groundtruth.txt", "precious\n");
+  expect_refused(run_to(data_.string()), {data_.string(), "is a dataset", "choose another --out"});
+  EXPECT_EQ(content(data_ / "groundtruth.txt"), "precious\n");
+}
+
+TEST_F(Output, FileThatCannotBeWrittenIsNamedAndTheOthersAreWritten) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  for (const char* broken : {"trajectory.txt", "keyframes.txt", "map.ply", "trajectory.png"}) {
+    fs::remove_all(run_);
+    fs::create_directories(run_);
+    fs::create_symlink("/dev/full", run_ / broken);
+    expect_refused(run(), {(run_ / broken).string(), "cannot be written in full"});
+    for (const char* file : kResults) {
+      if (file == std::string(broken)) continue;
+      EXPECT_GT(fs::file_size(run_ / file), 50u) << broken << " " << file;
+    }
+  }
+}
+
+TEST_F(Output, ReportThatCannotBeWrittenIsNoticedBeforeTheWork) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  fs::create_directories(run_);
+  fs::create_symlink("/dev/full", run_ / "run.json");
+  expect_refused(run(), {(run_ / "run.json").string(), "free space"});
+}
+
+TEST_F(Output, DiskThatFillsUpIsReported) {
+  fs::create_directories(run_);
+  if (mount("tmpfs", run_.c_str(), "tmpfs", 0, "size=12k") != 0) GTEST_SKIP() << "mounting is not allowed here";
+  const Outcome outcome = run();
+  const std::string trajectory = content(run_ / "trajectory.txt");
+  EXPECT_EQ(umount(run_.c_str()), 0);
+  expect_refused(outcome, {run_.string(), "free space"});
+  EXPECT_EQ(std::count(trajectory.begin(), trajectory.end(), '\n'), static_cast<long>(kFrames) + 1);
+}
+
+TEST_F(Output, StandardOutputThatIsFullIsReported) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  for (const std::string& arguments :
+       {std::string("run --print-config"),
+        "run '" + data_.string() + "' --camera simulated --quiet --out '" + run_.string() + "'",
+        "run '" + data_.string() + "' --camera simulated --json --out '" + run_.string() + "'"}) {
+    const Outcome outcome = run_program(arguments, scratch_, "/dev/full");
+    EXPECT_EQ(outcome.code, 1);
+    EXPECT_NE(outcome.error.find("stdout"), std::string::npos) << outcome.error;
+  }
+}
+
+TEST_F(Output, ResultsOfAnEarlierRunDoNotStay) {
+  fs::create_directories(run_);
+  put(run_ / "groundtruth.txt", "of another flight\n");
+  EXPECT_EQ(run().code, 0);
+  EXPECT_FALSE(fs::exists(run_ / "groundtruth.txt"));
+  EXPECT_TRUE(fs::exists(run_ / "trajectory.png"));
+  fs::remove_all(data_ / "depth");
+  EXPECT_EQ(run().code, 1);
+  EXPECT_FALSE(fs::exists(run_ / "trajectory.png"));
+  EXPECT_EQ(content(run_ / "trajectory.txt"), "# timestamp tx ty tz qx qy qz qw\n");
+}
+
+TEST_F(Output, NamesInAnotherEncodingDoNotCostTheRun) {
+  const fs::path odd = scratch_ / "fl\xfcg";  // Latin-1
+  fs::rename(data_, odd);
+  const Outcome outcome = run_program("run '" + odd.string() + "' --json --camera simulated --out '" + run_.string() + "'",
+                                      scratch_);
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  EXPECT_EQ(report()["frames"]["tracked"], kFrames);
+  EXPECT_EQ(nlohmann::json::parse(outcome.out)["frames"]["tracked"], kFrames);
+}
+
+TEST_F(Output, JsonIsOneObject) {
+  const Outcome outcome = run("--json");
+  EXPECT_EQ(outcome.code, 0);
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["interrupted"], false);
+  EXPECT_TRUE(json["error"].is_null());
+}
+
+class Interrupt : public Dataset, public testing::WithParamInterface<const char*> {
+ protected:
+  // A long flight; its progress is shown on a terminal of the test.
+  pid_t start(int progress) const {
+    posix_spawn_file_actions_t files;
+    posix_spawn_file_actions_init(&files);
+    posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    posix_spawn_file_actions_adddup2(&files, progress, STDERR_FILENO);
+    std::vector<std::string> words{"roslam", "run",   "simulated:street", "--traffic",
+                                   "none",   "--out", run_.string(),      GetParam()};
+    std::vector<char*> pointers;
+    for (auto& word : words) pointers.push_back(word.data());
+    pointers.push_back(nullptr);
+    pid_t process = -1;
+    EXPECT_EQ(posix_spawn(&process, ROSLAM_PROGRAM, &files, nullptr, pointers.data(), environ), 0);
+    posix_spawn_file_actions_destroy(&files);
+    return process;
+  }
+};
+
+TEST_P(Interrupt, EndsSoonAndWritesWhatIsThere) {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0) GTEST_SKIP() << "no pseudo terminal here";
+  const int program_end = open(ptsname(terminal), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  ASSERT_GE(program_end, 0);
+  const pid_t process = start(program_end);
+  char first = 0;
+  ASSERT_EQ(read(terminal, &first, 1), 1);  // progress is shown once a frame is tracked
+  const auto asked = Clock::now();
+  kill(process, SIGINT);
+  int status = -1;
+  ASSERT_EQ(waitpid(process, &status, 0), process);
+  close(program_end);
+  close(terminal);
+  EXPECT_LT(Clock::now() - asked, std::chrono::seconds(10));
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  const auto json = report();
+  EXPECT_EQ(json["interrupted"], true);
+  EXPECT_GT(json["frames"]["tracked"], 0);
+  EXPECT_EQ(trajectory().size(), json["frames"]["tracked"].get<std::size_t>());
+  EXPECT_EQ(read_trajectory(run_ / "groundtruth.txt").trajectory.size(),
+            json["frames"]["processed"].get<std::size_t>());
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, Interrupt, testing::Values("--deterministic", "--real-time"));
+
+}  // namespace
+}  // namespace roslam::street

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+
+#include "roslam/error.hpp"
+#include "roslam/sources/image_file.hpp"
+#include "roslam/sources/tum_source.hpp"
+
+namespace roslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<TimedFile> at(const std::vector<double>& times) {
+  std::vector<TimedFile> files;
+  for (const double time : times) files.push_back({time, "image.png"});
+  return files;
+}
+
+std::vector<int> pairs(const std::vector<double>& colour, const std::vector<double>& depth, double tolerance = 0.02) {
+  return associate(at(colour), at(depth), tolerance);
+}
+
+TEST(Associate, TakesTheNearestInTime) {
+  EXPECT_EQ(pairs({1.0, 2.0}, {0.99, 1.005, 1.99}), (std::vector<int>{1, 2}));
+  EXPECT_EQ(pairs({1.0}, {0.995, 1.001, 1.01}), (std::vector<int>{1}));
+}
+
+TEST(Associate, LeavesOutWhatIsTooFar) {
+  EXPECT_EQ(pairs({1.0, 2.0, 3.0}, {0.97, 2.021, 3.01}), (std::vector<int>{-1, -1, 2}));
+  EXPECT_EQ(pairs({1.0}, {}), (std::vector<int>{-1}));
+  EXPECT_EQ(pairs({}, {1.0}), std::vector<int>());
+  EXPECT_EQ(pairs({1.0, 2.0}, {1.0, 2.5}, 0.0), (std::vector<int>{0, -1}));
+}
+
+TEST(Associate, ToleranceIncludesItsEnd) {
+  // Quarters are exact in binary.
+  EXPECT_EQ(pairs({1.0}, {1.25}, 0.25), (std::vector<int>{0}));
+  EXPECT_EQ(pairs({1.0}, {0.75}, 0.25), (std::vector<int>{0}));
+  EXPECT_EQ(pairs({1.0}, {1.5}, 0.25), (std::vector<int>{-1}));
+}
+
+TEST(Associate, UsesEachDepthImageOnce) {
+  // The second image is nearer to the only depth; the first must not take it.
+  EXPECT_EQ(pairs({1.0, 1.015}, {1.014}), (std::vector<int>{-1, 0}));
+  EXPECT_EQ(pairs({1.0, 1.5, 2.0}, {1.375, 1.75}, 0.5), (std::vector<int>{-1, 0, 1}));
+}
+
+TEST(Associate, OfEqualDistancesTheEarlierImageWins) {
+  EXPECT_EQ(pairs({1.0, 1.5}, {1.25}, 0.5), (std::vector<int>{0, -1}));
+  EXPECT_EQ(pairs({1.25}, {1.0, 1.5}, 0.5), (std::vector<int>{0}));
+}
+
+class TumFolder : public testing::Test {
+ protected:
+  void SetUp() override {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    cv::imwrite((folder_ / "colour.png").string(), cv::Mat(48, 64, CV_8UC3, cv::Scalar(10, 20, 30)));
+    cv::imwrite((folder_ / "colour.jpg").string(), cv::Mat(48, 64, CV_8UC3, cv::Scalar(10, 20, 30)));
+    cv::imwrite((folder_ / "grey.png").string(), cv::Mat(48, 64, CV_8UC1, cv::Scalar(77)));
+    cv::imwrite((folder_ / "depth.png").string(), cv::Mat(48, 64, CV_16UC1, cv::Scalar(2500)));
+    camera_.width = 64;
+    camera_.height = 48;
+    camera_.fx = camera_.fy = 50.0;
+    camera_.cx = 31.5;
+    camera_.cy = 23.5;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  void write(const std::string& colour, const std::string& depth) const {
+    std::ofstream(folder_ / "rgb.txt") << colour;
+    std::ofstream(folder_ / "depth.txt") << depth;
+  }
+
+  std::vector<Frame> read(TumSource& source) const {
+    std::vector<Frame> frames;
+    while (auto frame = source.next()) frames.push_back(*frame);
+    return frames;
+  }
+
+  const fs::path folder_ = fs::path(testing::TempDir()) / "roslam_tum_source_test";
+  Camera camera_;
+};
+
+TEST_F(TumFolder, GivesColourAsBgrWhateverItsFormat) {
+  write("1 colour.png\n2 colour.jpg\n3 grey.png\n", "1 depth.png\n");
+  TumSource source(folder_, camera_);
+  const auto frames = read(source);
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(source.size(), 3u);
+  for (const auto& frame : frames) EXPECT_EQ(frame.colour.type(), CV_8UC3);
+  EXPECT_EQ(frames[0].colour.at<cv::Vec3b>(24, 32), cv::Vec3b(10, 20, 30));
+  EXPECT_NEAR(frames[1].colour.at<cv::Vec3b>(24, 32)[2], 30, 3);
+  EXPECT_EQ(frames[2].colour.at<cv::Vec3b>(24, 32), cv::Vec3b(77, 77, 77));
+  EXPECT_FALSE(frames[0].depth.empty());
+  EXPECT_TRUE(frames[1].depth.empty());
+  EXPECT_EQ(source.skipped_depth().at("no depth image near in time"), 2u);
+  EXPECT_TRUE(source.skipped().empty());
+}
+
+TEST_F(TumFolder, DividesDepthByTheFactorOfTheCamera) {
+  write("1 colour.png\n", "1 depth.png\n");
+  for (const auto& [units, metres] : {std::pair{1000.0, 2.5F}, {5000.0, 0.5F}, {2500.0, 1.0F}, {1.0, 2500.0F}}) {
+    camera_.depth_units_per_metre = units;
+    TumSource source(folder_, camera_);
+    const auto frame = source.next();
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->depth.type(), CV_32FC1);
+    EXPECT_FLOAT_EQ(frame->depth.at<float>(24, 32), metres);
+  }
+  EXPECT_EQ(depth_to_metres(cv::Mat::zeros(1, 1, CV_16UC1), 1000.0).at<float>(0, 0), 0.0F);
+}
+
+TEST_F(TumFolder, DropsAsFewImagesAsLeaveTheTimesIncreasing) {
+  const auto times = [&](const std::string& words) {
+    std::string list;
+    for (const char c : words) list += std::string(1, c) + " colour.png\n";
+    write(list, "1 depth.png\n");
+    TumSource source(folder_, camera_);
+    std::string kept;
+    for (const auto& frame : read(source)) kept += std::to_string(std::lround(frame.timestamp));
+    const auto skipped = source.skipped();
+    const std::size_t dropped = skipped.empty() ? 0 : skipped.at("colour image out of the order of time");
+    EXPECT_EQ(dropped, words.size() - kept.size()) << words;
+    EXPECT_EQ(source.size(), words.size());
+    return kept;
+  };
+  EXPECT_EQ(times("12345"), "12345");
+  EXPECT_EQ(times("92345"), "2345");
+  EXPECT_EQ(times("12945"), "1245");
+  EXPECT_EQ(times("23145"), "2345");
+  EXPECT_EQ(times("12334"), "1234");
+  EXPECT_EQ(times("5555"), "5");
+  EXPECT_EQ(times("8912345"), "12345");
+  EXPECT_EQ(times("1"), "1");
+}
+
+TEST_F(TumFolder, OfRepeatedTimesTheFirstStays) {
+  write("1 colour.png\n1 grey.png\n", "1 depth.png\n");
+  TumSource source(folder_, camera_);
+  EXPECT_EQ(source.next()->colour.at<cv::Vec3b>(0, 0), cv::Vec3b(10, 20, 30));
+  EXPECT_FALSE(source.next());
+}
+
+TEST_F(TumFolder, RefusesWhatCannotBeRead) {
+  EXPECT_THROW(TumSource(folder_ / "nowhere", camera_), InputError);
+  EXPECT_THROW(TumSource(folder_, camera_), InputError);
+  write("1 colour.png\n", "1 depth.png\n");
+  EXPECT_NO_THROW(TumSource(folder_, camera_));
+  for (const double bad : {-0.1, 10.0, std::numeric_limits<double>::quiet_NaN()}) {
+    TumOptions options;
+    options.max_time_difference = bad;
+    EXPECT_THROW(TumSource(folder_, camera_, options), OptionsError);
+  }
+  camera_.fx = 0.0;
+  EXPECT_THROW(TumSource(folder_, camera_), CalibrationError);
+}
+
+}  // namespace
+}  // namespace roslam
