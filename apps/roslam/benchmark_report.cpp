@@ -2,6 +2,7 @@
 #include "apps/roslam/benchmark_report.hpp"
 
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <functional>
 #include <limits>
