@@ -86,6 +86,7 @@ TEST_F(BadSettings, PrintedConfigurationReadsBack) {
 
 TEST_F(BadSettings, SimulatedFlightsAreCheckedToo) {
   const std::string out = " --quiet --out '" + run_.string() + "'";
+  expect_refused(run("--frames 5"), {"--frames", "simulated flight"});
   expect_refused(run_program("run simulated:river" + out, scratch_), {"simulated:river", "simulated:street"});
   expect_refused(run_program("run simulated:street --camera tum-fr1" + out, scratch_), {"--camera tum-fr1"});
 }
@@ -95,7 +96,7 @@ TEST_F(BadSettings, WrongUsageExitsWithTwo) {
   for (const std::string& arguments :
        {std::string(), std::string("fly"), std::string("run"), "run '" + data_.string() + "' --camera simulated",
         "run --camera simulated --out '" + run_.string() + "'", good + "--unknown", good + "another",
-        good + "--deterministic --real-time", good + "--frames -1", good + "--frames few", good + "--seed x",
+        good + "--deterministic --real-time", good + "--frames -1", good + "--frames few", good + "--seed x", good + "--seed -1",
         good + "--traffic dense"}) {
     const Outcome outcome = run_program(arguments, scratch_);
     EXPECT_EQ(outcome.code, 2) << arguments;
@@ -123,7 +124,7 @@ TEST_F(BadSettings, EvaluationSkipsAndCountsUnusableTruth) {
   put(data_ / "groundtruth.txt", "1 0 0 0 nan nan nan nan\n2 0 0 0 3 3 3 3\n");
   expect_refused(run_program(both, scratch_), {"groundtruth.txt", "holds no pose"});
   put(run_ / "trajectory.txt", "# timestamp tx ty tz qx qy qz qw\n");
-  put(data_ / "groundtruth.txt", truth.str());
+  put(data_ / "groundtruth.txt", estimate.str());
   expect_refused(run_program(both, scratch_), {"trajectory.txt", "holds no pose"});
 }
 
