@@ -80,7 +80,7 @@ TEST(Camera, BoundsHoldEveryUndistortedCorner) {
 class CameraFile : public testing::Test {
  protected:
   Camera read(const std::string& text) const {
-    const auto file = std::filesystem::path(testing::TempDir()) / "camera_test.yaml";
+    const auto file = std::filesystem::path(testing::TempDir()) / (std::string("camera_test_") + testing::UnitTest::GetInstance()->current_test_info()->name() + ".yaml");
     std::ofstream(file) << text;
     return read_camera(file);
   }
@@ -107,7 +107,7 @@ TEST_F(CameraFile, RejectsAbsurdCalibration) {
       FAIL() << key << ": " << value << " was accepted";
     } catch (const CalibrationError& error) {
       EXPECT_NE(std::string(error.what()).find(key), std::string::npos) << error.what();
-      EXPECT_NE(std::string(error.what()).find("camera_test.yaml"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("camera_test_RejectsAbsurdCalibration.yaml"), std::string::npos) << error.what();
     }
   }
   EXPECT_THROW(read(good_ + "depth_units_per_metre: 0\n"), CalibrationError);

@@ -10,5 +10,6 @@ namespace roslam::app {
 void add_run_command(CLI::App& program, const std::string& version);
 void add_simulate_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
+void add_benchmark_command(CLI::App& program, const std::string& version);
 
 }  // namespace roslam::app

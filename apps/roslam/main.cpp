@@ -27,6 +27,7 @@ int main(int argc, char** argv) {
   roslam::app::add_run_command(program, ROSLAM_VERSION);
   roslam::app::add_simulate_command(program);
   roslam::app::add_evaluate_command(program);
+  roslam::app::add_benchmark_command(program, ROSLAM_VERSION);
   try {
     program.parse(argc, argv);
     return 0;

@@ -8,19 +8,13 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "roslam/evaluation/markdown_table.hpp"
+
 namespace roslam {
 
 namespace {
 using Json = nlohmann::ordered_json;
-using Row = std::vector<std::string>;
 using Value = std::function<double(const TrajectoryError&)>;
-
-std::string fixed(double value, int decimals) {
-  if (!std::isfinite(value)) return "-";
-  std::array<char, 400> text{};
-  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
-  return text.data();
-}
 
 struct Column {
   std::string title;
@@ -69,44 +63,11 @@ double median_of(const std::vector<EvaluatedTrajectory>& runs, const Value& valu
   return median(std::move(values));
 }
 
-std::string escaped(std::string name) {
-  for (auto at = name.find('|'); at != std::string::npos; at = name.find('|', at + 2))
-    name.insert(at, 1, '\\');
-  return name;
-}
-
-// Numbers to the right, names to the left, all cells of a column of one width.
-std::string table(const std::vector<Row>& rows) {
-  std::vector<std::size_t> widths(rows.front().size(), 3);
-  for (const auto& row : rows) {
-    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
-  }
-  std::string text;
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    text += "|";
-    for (std::size_t c = 0; c < rows[r].size(); ++c) {
-      const std::string padding(widths[c] - rows[r][c].size(), ' ');
-      text += " ";
-      text += c == 0 ? rows[r][c] + padding : padding + rows[r][c];
-      text += " |";
-    }
-    text += "\n";
-    if (r > 0) continue;
-    text += "|";
-    for (std::size_t c = 0; c < widths.size(); ++c) {
-      text += std::string(widths[c] + 1, '-');
-      text += c == 0 ? "-|" : ":|";
-    }
-    text += "\n";
-  }
-  return text;
-}
-
-std::string table(const TrajectoryReport& report, const std::vector<Column>& columns) {
-  std::vector<Row> rows{{"trajectory"}};
+std::string table_of(const TrajectoryReport& report, const std::vector<Column>& columns) {
+  std::vector<TableRow> rows{{"trajectory"}};
   for (const auto& column : columns) rows.front().push_back(column.title);
   const auto add = [&](const EvaluatedTrajectory& trajectory) {
-    rows.push_back({escaped(trajectory.name)});
+    rows.push_back({table_cell(trajectory.name)});
     for (const auto& column : columns)
       rows.back().push_back(fixed(column.value(trajectory.error), column.decimals));
   };
@@ -118,7 +79,7 @@ std::string table(const TrajectoryReport& report, const std::vector<Column>& col
     }
   }
   std::for_each(report.others.begin(), report.others.end(), add);
-  return table(rows);
+  return markdown_table(rows);
 }
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -167,9 +128,9 @@ std::string to_markdown(const TrajectoryReport& report) {
   const bool with_scale = report.options.alignment == AlignmentModel::kSimilarity;
   std::string text = "Absolute trajectory error, aligned by ";
   text += with_scale ? "Sim(3) (rotation, translation and scale)" : "SE(3) (rotation and translation)";
-  text += "\n\n" + table(report, absolute_columns(with_scale));
+  text += "\n\n" + table_of(report, absolute_columns(with_scale));
   text += "\nRelative pose error, from frame to frame and over a span of time\n\n";
-  return text + table(report, relative_columns(report.options.span));
+  return text + table_of(report, relative_columns(report.options.span));
 }
 
 std::string to_json(const TrajectoryReport& report) {

@@ -10,7 +10,7 @@ namespace roslam {
 
 /// How far measured points are trusted.
 struct MeasurementNoise {
-  double pixel_sigma = 1.0;          ///< pixels at the finest pyramid level; grows with the level's scale
+  double pixel_sigma = 1.5;          ///< pixels at the finest pyramid level; grows with the level's scale
   double depth_sigma = 0.005;         ///< metres, the part that does not depend on distance
   double depth_sigma_growth = 0.004;  ///< 1/metre: depth noise grows with the square of the distance (Khoshelham 2012)
 

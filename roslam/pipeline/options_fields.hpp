@@ -41,6 +41,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("tracker", "min_initial_points", o.tracker.min_initial_points);
   visit("tracker", "min_inliers", o.tracker.min_inliers);
   visit("tracker", "min_frame_matches", o.tracker.min_frame_matches);
+  visit("tracker", "min_agreement", o.tracker.min_agreement);
   visit("tracker", "recently_lost_frames", o.tracker.recently_lost_frames);
   visit("keyframes", "max_interval", o.keyframes.max_interval);
   visit("keyframes", "min_interval", o.keyframes.min_interval);

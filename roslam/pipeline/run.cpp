@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "roslam/pipeline/bounded_queue.hpp"
+#include "roslam/pipeline/statistics.hpp"
 
 namespace roslam {
 
@@ -122,6 +123,7 @@ class Runner {
     }
     if (summary_.first_pose_seconds < 0.0 && result->T_world_camera) {
       summary_.first_pose_seconds = seconds_since(start_);
+      if (const double age = process_age(); age >= 0.0) summary_.start_up_seconds = age;
     }
     if (on_frame_) on_frame_(*result);
   }

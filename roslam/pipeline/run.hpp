@@ -18,6 +18,7 @@ struct RunSummary {
   std::exception_ptr failure;         ///< what ended the run early, else null; the results until then are good
   double wall_seconds = 0.0;          ///< from the first read to the last result
   double first_pose_seconds = -1.0;   ///< from the first read to the first pose; negative = no pose
+  double start_up_seconds = -1.0;     ///< from the start of the process to the first pose; negative = not known
   Trajectory truth;                   ///< true poses of the frames, where the source knows them
 };
 

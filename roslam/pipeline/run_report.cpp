@@ -107,6 +107,7 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   json["wall_seconds"] = rounded(summary.wall_seconds, 3);
   json["frames_per_second"] = rounded(per_second, 2);
   json["first_pose_seconds"] = rounded(summary.first_pose_seconds, 3);
+  json["start_up_seconds"] = rounded(summary.start_up_seconds, 2);
   json["peak_memory_megabytes"] = rounded(static_cast<double>(peak_memory()) / 1048576.0, 1);
   json["processor_milliseconds"] = times_json(slam.times());
   json["camera"] = camera_json(slam.camera());

@@ -27,7 +27,10 @@ class StageTimes {
   std::map<std::string, std::vector<double>> samples_;
 };
 
-/// Most memory the process has held so far, in bytes.
+/// Most memory the program has held so far, in bytes; what the program that started it held does not count.
 std::size_t peak_memory();
+
+/// Seconds since the process was started, to a hundredth; NaN where the system does not tell.
+double process_age();
 
 }  // namespace roslam

@@ -52,7 +52,7 @@ float steepness(const cv::Mat& depth, int x, int y, float focal) {
   // The smaller of the two sides: an edge of an object is no slope.
   const float across = std::min(std::abs(at(x + 1, y) - z), std::abs(z - at(x - 1, y)));
   const float down = std::min(std::abs(at(x, y + 1) - z), std::abs(z - at(x, y - 1)));
-  return std::hypot(across, down) * focal / z;
+  return std::sqrt(across * across + down * down) * focal / z;
 }
 
 }  // namespace
@@ -88,15 +88,17 @@ cv::Mat stereo_depth(const cv::Mat& truth, const Camera& camera, const DepthNois
       const float z = depth[x];
       if (z < static_cast<float>(options.min_depth) || z >= sure + span) continue;
       if (hidden[static_cast<std::size_t>(x)] != 0) continue;
-      // Holes come in blotches of a few pixels.
-      const float luck =
-          0.7F * simulation::value_noise(static_cast<float>(x) / 5, static_cast<float>(y) / 5, seed) +
-          0.3F * unit(mix(seed, static_cast<std::uint32_t>(y * truth.cols + x)));
       const float lost_far = std::max(0.0F, (z - sure) / span);
       const float lost_slanted =
           std::clamp((steepness(truth, x, y, static_cast<float>(camera.fx)) - 6.0F) / 14.0F, 0.0F, 1.0F);
       const float lost = 1.0F - (1.0F - lost_far) * (1.0F - lost_slanted);
-      if (luck < 0.15F + 0.7F * lost && lost > 0.0F) continue;
+      if (lost > 0.0F) {
+        // Holes come in blotches of a few pixels.
+        const float luck =
+            0.7F * simulation::value_noise(static_cast<float>(x) / 5, static_cast<float>(y) / 5, seed) +
+            0.3F * unit(mix(seed, static_cast<std::uint32_t>(y * truth.cols + x)));
+        if (luck < 0.15F + 0.7F * lost) continue;
+      }
       const float disparity = disparity_of_metre / z + sigma * noise.at<float>(y, x);
       if (disparity <= 0.0F) continue;
       measured.at<float>(y, x) = std::round(disparity_of_metre / disparity * steps) / steps;

@@ -141,6 +141,37 @@ bool CityPlan::in_crossing(const Vector2f& point, float margin) const {
   return near(streets_along_y, point.x()) && near(streets_along_x, point.y());
 }
 
+Sightlines::Sightlines(const CityPlan& plan) {
+  const Vector2f rim(0.5F, 0.5F);
+  for (const Vector2f& column : gaps(plan.streets_along_y, plan.low.x(), plan.high.x(), plan.facade)) {
+    for (const Vector2f& row : gaps(plan.streets_along_x, plan.low.y(), plan.high.y(), plan.facade)) {
+      blocks_.emplace_back(Vector2f(column.x(), row.x()) + rim, Vector2f(column.y(), row.y()) - rim);
+    }
+  }
+}
+
+bool Sightlines::blocked(const Vector2f& from, const Vector2f& to) const {
+  const Vector2f step = to - from;
+  return std::any_of(blocks_.begin(), blocks_.end(), [&](const Eigen::AlignedBox2f& block) {
+    float enter = 0.0F;
+    float leave = 1.0F;
+    for (int axis = 0; axis < 2; ++axis) {
+      const float slope = std::abs(step[axis]) > 1e-6F ? step[axis] : 1e-6F;
+      const float a = (block.min()[axis] - from[axis]) / slope;
+      const float b = (block.max()[axis] - from[axis]) / slope;
+      enter = std::max(enter, std::min(a, b));
+      leave = std::min(leave, std::max(a, b));
+    }
+    return enter < leave;
+  });
+}
+
+bool Sightlines::hidden(const Vector2f& from, const Vector2f& to, float radius) const {
+  const Vector2f along = (to - from).normalized();
+  const Vector2f aside = radius * Vector2f(-along.y(), along.x());
+  return blocked(from, to) && blocked(from, to + aside) && blocked(from, to - aside);
+}
+
 Mesh build_city(const CityPlan& plan, std::uint32_t seed) {
   Mesh mesh;
   MeshBuilder builder(mesh);

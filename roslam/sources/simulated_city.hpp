@@ -26,6 +26,19 @@ struct CityPlan {
   bool in_crossing(const Vector2f& point, float margin) const;
 };
 
+/// Tells what cannot be seen for the houses between.
+class Sightlines {
+ public:
+  explicit Sightlines(const CityPlan& plan);
+
+  /// Whether a thing of that radius (metres) at `to` is behind houses for an eye at `from`.
+  bool hidden(const Vector2f& from, const Vector2f& to, float radius) const;
+
+ private:
+  bool blocked(const Vector2f& from, const Vector2f& to) const;
+  std::vector<Eigen::AlignedBox2f> blocks_;
+};
+
 /// Everything that stands still and cannot be moved.
 Mesh build_city(const CityPlan& plan, std::uint32_t seed);
 

@@ -105,6 +105,7 @@ void MeshBuilder::tube(const Vector3f& from, const Vector3f& to, float radius_fr
     const auto at = first + 2U * static_cast<std::uint32_t>(i);
     face(at, at + 2, at + 3);
     face(at, at + 3, at + 1);
+    if (coarse()) continue;  // nobody sees from afar that the ends are open
     face(centre_from, at + 2, at);
     face(centre_to, at + 1, at + 3);
   }

@@ -81,6 +81,7 @@ class MeshBuilder {
   /// How finely round things are divided from now on: 1 is in full, for what is near.
   void set_detail(float detail) { detail_ = detail; }
   float detail() const { return detail_; }
+  bool coarse() const { return detail_ < 0.45F; }  ///< too far away for small parts to be seen
 
   /// Corners anticlockwise as seen from outside.
   void quad(const Vector3f& a, const Vector3f& b, const Vector3f& c, const Vector3f& d, const Vector2f& uv_a,

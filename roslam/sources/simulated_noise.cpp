@@ -198,8 +198,17 @@ float DetailTexture::sample(float u, float v, float footprint) const {
   const int level = static_cast<int>(bits >> 23) - 127;
   if (level >= kLevels - 2) return 0.0F;
   const float fraction = static_cast<float>(bits & 0x7fffffU) * (1.0F / 8388608.0F);
+  // Two levels are mixed only half way between them, which saves a sample where one of them is near enough.
+  const float share = 2.0F * fraction - 0.5F;
+  if (share <= 0.0F) return bilinear(level, u, v);
+  if (share >= 1.0F) return bilinear(level + 1, u, v);
   const float fine = bilinear(level, u, v);
-  return fine + (bilinear(level + 1, u, v) - fine) * fraction;
+  return fine + (bilinear(level + 1, u, v) - fine) * share;
+}
+
+float DetailTexture::soft(float u, float v) const {
+  constexpr int kSoftLevel = 4;
+  return bilinear(kSoftLevel, u, v);
 }
 
 }  // namespace roslam::simulation

@@ -66,6 +66,9 @@ class DetailTexture {
   /// About [-1, 1] with mean 0. The tile has period 1; footprint is the width of a pixel in tiles.
   float sample(float u, float v, float footprint) const;
 
+  /// Only its broad features, about 32 across the tile.
+  float soft(float u, float v) const;
+
  private:
   static constexpr int kLevels = 10;
   float bilinear(int level, float u, float v) const;

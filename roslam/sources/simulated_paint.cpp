@@ -33,12 +33,8 @@ Vector3f Painter::sky(const Vector3f& direction) const {
   const float scale = 1.0F / (up + 0.18F);
   const float x = direction.x() * scale;
   const float y = direction.y() * scale;
-  float cloud = 0.0F;
-  float weight = 0.5F;
-  float frequency = 1.1F;
-  for (std::uint32_t i = 0; i < 5; ++i, weight *= 0.5F, frequency *= 2.1F) {
-    cloud += weight * value_noise(x * frequency, y * frequency, mix(seed_, i));
-  }
+  const float cloud = 0.5F + 0.3F * grain_.soft(x / 23, y / 23) + 0.17F * grain_.soft(x / 7, y / 7) +
+                      0.08F * grain_.soft(y / 2, x / 2);
   const float cover = std::clamp((cloud - 0.45F) * 5.0F, 0.0F, 1.0F);
   return blend(colour, Vector3f::Constant(0.98F - 0.25F * std::clamp(cloud - 0.5F, 0.0F, 1.0F)),
                0.85F * cover);

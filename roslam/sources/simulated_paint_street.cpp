@@ -72,10 +72,10 @@ Vector3f Painter::road(const Spot& spot) const {
     tone += newer * inside(0.0F) - 0.13F * (inside(0.0F) - inside(0.05F));
   }
   // Cracks, where the road is old.
-  const float age = value_noise(p.x() / 7, p.y() / 7, seed_);
+  const float age = 0.5F + 0.9F * grain_.soft(p.x() / 113, p.y() / 113);
   tone += 0.26F * std::clamp(2.5F * age - 0.9F, 0.0F, 1.0F) *
           cracks_.sample(p.x() / 6.3F, p.y() / 6.3F, w / 6.3F);
-  tone -= 0.10F * std::clamp(3.0F * value_noise(p.x() / 1.9F, p.y() / 1.9F, mix(seed_, 8)) - 2.2F, 0.0F,
+  tone -= 0.10F * std::clamp(3.0F * (0.5F + 0.9F * grain_.soft(p.y() / 37, p.x() / 37)) - 2.2F, 0.0F,
                              1.0F);  // oil
   Vector3f colour = tone * Vector3f(1.0F, 0.995F, 0.98F);
   const float wear = std::clamp(0.9F + 0.9F * blotches, 0.15F, 1.0F);

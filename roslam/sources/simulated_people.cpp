@@ -157,6 +157,7 @@ void add_pedestrian(MeshBuilder& builder, const Stance& stance, std::uint16_t in
     const Vector3f hand = elbow + 0.16F * h * Vector3f(std::sin(bend), 0, -std::cos(bend));
     builder.use(looks.top);
     limb(builder, shoulder, elbow, hand, 0.03F * h, 0.019F * h);
+    if (builder.coarse()) continue;
     builder.ellipsoid(shoulder, {0.032F * h, 0.03F * h, 0.032F * h}, 6, 8);
     builder.use(looks.skin);
     builder.ellipsoid(hand, {0.024F * h, 0.017F * h, 0.034F * h}, 5, 7);

@@ -161,8 +161,10 @@ void Renderer::light(const Eye& eye, bool movables, Hits& hits) const {
       if (hits.sunlit[i] != (open[i] != 0)) hits.touched[i] = true;
     }
   }
+  // What lies below something lies in its shadow too, or in that of a house.
   const auto on_ground = [&](std::size_t i) {
-    return hits.point[i].z() < 0.2F && (hits.part[i] & kMovable) == 0 && hits.normal[i].z() > 0.5F;
+    return !hits.sunlit[i] && hits.point[i].z() < 0.2F && (hits.part[i] & kMovable) == 0 &&
+           hits.normal[i].z() > 0.5F;
   };
   if (movables && aim({0, 0, 1}, 1.2F, on_ground)) {
     const auto before = rays.active;
@@ -256,16 +258,16 @@ void Renderer::draw_centres(const Eye& eye, const std::vector<cv::Point>& pixels
   }
 }
 
-// Draws the colours of these pixels as the mean of four points within each.
+// Makes the colours of these pixels the mean of their centres, as drawn already, and of two points more.
 void Renderer::smooth_edges(const Eye& eye, const std::vector<cv::Point>& pixels, bool movables,
                             Picture& picture) const {
-  constexpr std::size_t kPerPixel = 4;
-  constexpr float kOffsets[kPerPixel][2] = {
-      {-0.125F, -0.375F}, {0.375F, -0.125F}, {-0.375F, 0.125F}, {0.125F, 0.375F}};
+  constexpr std::size_t kPerPixel = 2;
+  constexpr std::size_t kPixels = kPacket / kPerPixel;
+  constexpr float kOffsets[kPerPixel][2] = {{-0.35F, 0.22F}, {0.22F, -0.35F}};
   Samples samples;
-  for (std::size_t first = 0; first < pixels.size(); first += 2) {
+  for (std::size_t first = 0; first < pixels.size(); first += kPixels) {
     Points points;
-    points.count = first + 1 < pixels.size() ? 8 : 4;
+    points.count = static_cast<int>(kPerPixel * std::min(kPixels, pixels.size() - first));
     for (std::size_t i = 0; i < kPacket; ++i) {
       const cv::Point& pixel = pixels[std::min(first + i / kPerPixel, pixels.size() - 1)];
       points.x[i] = static_cast<float>(pixel.x) + kOffsets[i % kPerPixel][0];
@@ -274,12 +276,12 @@ void Renderer::smooth_edges(const Eye& eye, const std::vector<cv::Point>& pixels
     sample(eye, points, kPerPixel, movables, samples);
     for (std::size_t j = 0; j < static_cast<std::size_t>(points.count) / kPerPixel; ++j) {
       const cv::Point& pixel = pixels[first + j];
-      Vector3f sum = Vector3f::Zero();
+      cv::Vec3f& colour = picture.colour.at<cv::Vec3f>(pixel);
       for (std::size_t i = j * kPerPixel; i < (j + 1) * kPerPixel; ++i) {
-        sum += samples[i].colour.cwiseMin(1.0F);
+        colour += bgr(samples[i].colour);
         if (samples[i].touched) picture.touched.at<std::uint8_t>(pixel) = 255;
       }
-      picture.colour.at<cv::Vec3f>(pixel) = bgr(sum / static_cast<float>(kPerPixel));
+      colour *= 1.0F / (kPerPixel + 1);
     }
   }
 }

@@ -17,7 +17,7 @@ constexpr float kReach =
 }  // namespace
 
 Traffic::Traffic(const CityPlan& plan, TrafficLevel level, std::uint32_t seed)
-    : kerb_height_(plan.kerb_height) {
+    : kerb_height_(plan.kerb_height), sightlines_(plan) {
   Dice dice(mix(seed, 0x7aff1cU));
   park_cars(plan, dice);
   if (level == TrafficLevel::kNone) return;
@@ -165,6 +165,7 @@ void Traffic::add_to(Mesh& mesh, double time, const SE3& T_world_camera) const {
     const float depth = offset.dot(ahead);
     const float aside = std::abs(offset.x() * ahead.y() - offset.y() * ahead.x());
     if (depth < -kBehind || depth > kSight || aside > 1.1F * std::max(depth, 0.0F) + 9.0F) continue;
+    if (depth > 20.0F && sightlines_.hidden(eye.head<2>(), stance.foot.head<2>(), 4.0F)) continue;
     builder.set_detail(std::clamp(8.0F / std::max(depth, 1.0F), 0.3F, 1.0F));
     switch (actor.kind) {
       case Kind::kCar:

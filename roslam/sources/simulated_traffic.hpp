@@ -47,6 +47,7 @@ class Traffic {
   std::vector<Actor> actors_;
   std::uint16_t last_instance_ = 0;
   float kerb_height_ = 0.12F;
+  Sightlines sightlines_;
 };
 
 }  // namespace roslam::simulation

@@ -43,6 +43,7 @@ void TrackerOptions::validate() const {
   if (min_initial_points < 10) throw OptionsError("tracker.min_initial_points must be at least 10");
   if (min_inliers < 6) throw OptionsError("tracker.min_inliers must be at least 6");
   if (min_frame_matches < 6) throw OptionsError("tracker.min_frame_matches must be at least 6");
+  if (!(min_agreement >= 0.0 && min_agreement <= 1.0)) throw OptionsError("tracker.min_agreement must be 0 to 1");
   if (recently_lost_frames < 0) throw OptionsError("tracker.recently_lost_frames must not be negative");
 }
 
@@ -103,8 +104,10 @@ TrackedFrame Tracker::initialise(TrackedFrame frame) {
 bool Tracker::follow(TrackedFrame& frame) {
   const SE3 predicted = predict_pose(frame.timestamp);
   constexpr float kWider = 3.0F;
-  const bool matched = match_last_frame(frame, predicted, 1.0F) || match_last_frame(frame, predicted, kWider) ||
-                       match_reference(frame);
+  // Where the motion is unknown, what lies near in the image may be the wrong thing: descriptors alone decide.
+  const bool is_predictable = velocity_age_ >= 0.0;
+  const bool matched = (is_predictable && match_last_frame(frame, predicted, 1.0F)) || match_reference(frame) ||
+                       match_last_frame(frame, predicted, kWider);
   return matched && refine_with_local_map(frame);
 }
 
@@ -162,7 +165,7 @@ bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float 
   points.resize(kept);
   times_.match_frame += watch.seconds();
   frame.T_camera_world = predicted;
-  const bool good = estimate(frame, positions, points, settings_.tracker.min_frame_matches);
+  const bool good = first_estimate(frame, positions, points);
   std::replace(frame.landmarks.begin(), frame.landmarks.end(), kTemporary, LandmarkId{});
   return good;
 }
@@ -185,7 +188,13 @@ bool Tracker::match_reference(TrackedFrame& frame) {
   }
   times_.match_frame += watch.seconds();
   frame.T_camera_world = last_pose();
-  return estimate(frame, positions, points, settings_.tracker.min_frame_matches);
+  return first_estimate(frame, positions, points);
+}
+
+bool Tracker::first_estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
+                             const std::vector<std::uint32_t>& points) {
+  return estimate(frame, positions, points, settings_.tracker.min_frame_matches) &&
+         frame.inliers >= settings_.tracker.min_agreement * static_cast<double>(points.size());
 }
 
 // Optimises the pose on matches of points with positions in the world; forgets the outliers.

@@ -30,7 +30,8 @@ std::string_view name_of(TrackingState state);
 struct TrackerOptions {
   int min_initial_points = 80;     ///< points of known depth the first keyframe needs
   int min_inliers = 20;            ///< landmarks a pose must rest on
-  int min_frame_matches = 15;      ///< matches with the last frame for its prediction to count
+  int min_frame_matches = 15;      ///< matches with the last frame that a first estimate must rest on
+  double min_agreement = 0.5;      ///< share of those matches that must agree on it, else matching was by chance
   int recently_lost_frames = 30;   ///< frames after which recently lost becomes lost
 
   /// Throws OptionsError naming the field.
@@ -90,6 +91,8 @@ class Tracker {
   bool relocalise(TrackedFrame& frame);
   bool estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
                 const std::vector<std::uint32_t>& points, int min_inliers);
+  bool first_estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
+                      const std::vector<std::uint32_t>& points);
   void match_local_landmarks(TrackedFrame& frame, const std::vector<LandmarkId>& landmarks, double radius_factor);
   void count_predictions(const TrackedFrame& frame);
   SE3 predict_pose(double timestamp) const;

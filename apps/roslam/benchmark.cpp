@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/benchmark.hpp"
+
+#include "apps/roslam/commands.hpp"
+
+namespace roslam::app {
+
+void add_benchmark_command(CLI::App& program, const std::string& version) {
+  auto* benchmark =
+      program.add_subcommand("benchmark", "Measure accuracy, time and memory over whole sequences.");
+  benchmark->require_subcommand(1);
+  add_benchmark_static_command(*benchmark, version);
+}
+
+}  // namespace roslam::app

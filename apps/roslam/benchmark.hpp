@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace roslam::app {
+
+// Each adds one kind of benchmark to `roslam benchmark`; a file of its own holds each.
+void add_benchmark_static_command(CLI::App& benchmark, const std::string& version);
+
+}  // namespace roslam::app

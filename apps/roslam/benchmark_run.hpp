@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "apps/roslam/benchmark_sequences.hpp"
+#include "roslam/evaluation/trajectory_error.hpp"
+#include "roslam/pipeline/options.hpp"
+#include "roslam/pipeline/statistics.hpp"
+
+namespace roslam::app {
+
+/// What all runs of a benchmark have in common.
+struct BenchmarkSettings {
+  Mode mode = Mode::kDeterministic;
+  std::string config;            ///< file with options; empty = the defaults
+  std::string traffic = "none";  ///< of simulated flights
+  std::size_t frames = 300;      ///< of simulated flights; 0 = all
+  std::uint32_t seed = 1;        ///< of simulated flights
+};
+
+/// What one run of a sequence came to. Unknown numbers are NaN.
+struct BenchmarkRun {
+  std::string folder;   ///< where its files are, relative to the benchmark's folder
+  std::string failure;  ///< why there is no result; empty if there is one
+  bool is_interrupted = false;
+  double frames = 0.0;   ///< of the sequence
+  double tracked = 0.0;  ///< frames with a pose
+  double dropped = 0.0;
+  double keyframes = 0.0;
+  double landmarks = 0.0;
+  double frames_per_second = 0.0;
+  double start_up_seconds = 0.0;  ///< from the start of the process to the first pose
+  double peak_memory_megabytes = 0.0;
+  std::map<std::string, StageSummary> stages;  ///< processor time
+  std::optional<TrajectoryError> error;        ///< empty without truth, or if the two cannot be compared
+  std::string no_error_reason;                 ///< why they cannot be compared
+  Trajectory trajectory;
+  Trajectory truth;
+
+  bool is_complete() const { return failure.empty() && !is_interrupted; }
+};
+
+/// Runs a sequence once in a process of its own, whose memory and start-up are then its alone, and reads what
+/// it wrote to out/folder. What goes wrong in the run is told in the result; only a benchmark folder that
+/// cannot be written to throws (OutputError).
+BenchmarkRun run_sequence(const BenchmarkSequence& sequence, const BenchmarkSettings& settings,
+                          const std::filesystem::path& out, const std::string& folder,
+                          const std::stop_token& stop);
+
+}  // namespace roslam::app

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# What `cmake --install` lays down, so that another project can find_package(roslam) and link roslam::roslam.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+set(ROSLAM_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/roslam)
+
+install(TARGETS roslam EXPORT roslamTargets
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
+  INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+# The cost functions stay inside: they would make users of the headers need Ceres.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/roslam DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+  FILES_MATCHING PATTERN "*.hpp" PATTERN "bundle_cost.hpp" EXCLUDE)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/roslam)
+
+install(EXPORT roslamTargets NAMESPACE roslam:: DESTINATION ${ROSLAM_PACKAGE_DIR})
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/roslamConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/roslamConfig.cmake INSTALL_DESTINATION ${ROSLAM_PACKAGE_DIR})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/roslamConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/roslamConfig.cmake ${PROJECT_BINARY_DIR}/roslamConfigVersion.cmake
+  DESTINATION ${ROSLAM_PACKAGE_DIR})

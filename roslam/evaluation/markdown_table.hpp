@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace roslam {
+
+/// The cells of a table's row.
+using TableRow = std::vector<std::string>;
+
+/// A Markdown table that also reads well as plain text: the first column to the left, the others, which hold
+/// numbers, to the right, all cells of a column of one width. The first row is the head; no row may have more
+/// cells than it.
+std::string markdown_table(const std::vector<TableRow>& rows);
+
+/// A name as a table may hold it.
+std::string table_cell(std::string name);
+
+/// So many digits after the point; "-" for what is not finite.
+std::string fixed(double value, int decimals);
+
+}  // namespace roslam

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Installs the library, builds the example against what was installed, and runs it on a short simulated flight.
+#   cmake -DBUILD=... -DEXAMPLES=... -DWORK=... -DPROGRAM=... -DGENERATOR=... -DBUILD_TYPE=... -DCXX=...
+#         [-DCXX_FLAGS=...] -P install_test.cmake
+set(FRAMES 20)
+
+function(run_step)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    string(JOIN " " command ${ARGN})
+    message(FATAL_ERROR "${command}\nended with ${result}:\n${output}")
+  endif()
+endfunction()
+
+file(REMOVE_RECURSE ${WORK})  # what an earlier version installed must not help
+run_step(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix --config ${BUILD_TYPE})
+run_step(${CMAKE_COMMAND} -S ${EXAMPLES} -B ${WORK}/build -G ${GENERATOR} -DCMAKE_BUILD_TYPE=${BUILD_TYPE}
+  -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_CXX_FLAGS=${CXX_FLAGS} -DCMAKE_PREFIX_PATH=${WORK}/prefix)
+run_step(${CMAKE_COMMAND} --build ${WORK}/build --config ${BUILD_TYPE})
+run_step(${PROGRAM} simulate street --frames ${FRAMES} --out ${WORK}/flight)
+
+execute_process(
+  COMMAND ${WORK}/build/minimal ${WORK}/flight ${WORK}/flight/camera.yaml ${WORK}/trajectory.txt
+  RESULT_VARIABLE result OUTPUT_VARIABLE poses ERROR_VARIABLE errors)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "the example ended with ${result}: ${errors}")
+endif()
+string(REGEX MATCHALL "\n" lines "${poses}")
+list(LENGTH lines count)
+if(NOT count EQUAL FRAMES)
+  message(FATAL_ERROR "the example printed ${count} poses of ${FRAMES}:\n${poses}")
+endif()
+file(STRINGS ${WORK}/trajectory.txt written REGEX "^[0-9]")
+list(LENGTH written count)
+if(NOT count EQUAL FRAMES)
+  message(FATAL_ERROR "the example wrote ${count} poses of ${FRAMES}")
+endif()

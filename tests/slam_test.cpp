@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "roslam/error.hpp"
+#include "roslam/evaluation/trajectory_error.hpp"
+#include "roslam/pipeline/run.hpp"
+#include "roslam/pipeline/slam.hpp"
+#include "roslam/sources/simulated_source.hpp"
+#include "roslam/sources/tum_source.hpp"
+
+namespace roslam {
+namespace {
+
+struct Flight {
+  double ate = 0.0;          // metres, RMSE
+  double path = 0.0;         // metres
+  std::size_t frames = 0;
+  std::size_t tracked = 0;
+};
+
+Flight fly(FrameSource& source, const Trajectory& truth_file = {}) {
+  Slam slam(source.camera());
+  const RunSummary summary = run(source, slam);
+  const Trajectory& truth = truth_file.empty() ? summary.truth : truth_file;
+  const TrajectoryError error = evaluate_trajectory(truth, slam.trajectory());
+  return {error.ate.rmse, error.path_length, slam.frames(), slam.trajectory().size()};
+}
+
+Flight simulate(FlightPath path, DepthModel depth, std::size_t frames) {
+  SimulatorOptions options;
+  options.path = path;
+  options.depth = depth;
+  options.traffic = TrafficLevel::kNone;
+  options.frames = frames;
+  SimulatedSource source(options);
+  return fly(source);
+}
+
+TEST(Slam, FollowsTheStreetWithIdealDepth) {
+  const Flight flight = simulate(FlightPath::kStreet, DepthModel::kIdeal, 120);
+  EXPECT_EQ(flight.tracked, 120U);
+  EXPECT_LT(flight.ate, 0.02);
+}
+
+TEST(Slam, FollowsTheStreetWithNoisyDepth) {
+  const Flight flight = simulate(FlightPath::kStreet, DepthModel::kD455, 150);
+  EXPECT_EQ(flight.tracked, 150U);
+  EXPECT_LT(flight.ate, 0.04);
+}
+
+TEST(Slam, FollowsAHoverWithRotation) {
+  const Flight flight = simulate(FlightPath::kHover, DepthModel::kD455, 120);
+  EXPECT_EQ(flight.tracked, 120U);
+  EXPECT_LT(flight.ate, 0.06);
+}
+
+// The real sequences are too large to come with the project; where they are not at hand the test is skipped.
+class RealSequence : public testing::TestWithParam<std::tuple<const char*, const char*, double>> {};
+
+TEST_P(RealSequence, IsTrackedThroughoutAsAccuratelyAsOrbSlam2) {
+  const auto& [name, camera, limit] = GetParam();
+  const auto folder = std::filesystem::path(ROSLAM_TEST_DATA) / "slam" / name;
+  if (!TumSource::recognises(folder)) GTEST_SKIP() << folder << " is not at hand";
+  TumSource source(folder, load_camera(camera));
+  const Flight flight = fly(source, read_trajectory(folder / "groundtruth.txt").trajectory);
+  EXPECT_EQ(flight.tracked, flight.frames);
+  EXPECT_LE(flight.ate, limit);
+}
+
+INSTANTIATE_TEST_SUITE_P(Slam, RealSequence,
+                         testing::Values(std::make_tuple("fr1_rpy", "tum-fr1", 0.030),
+                                         std::make_tuple("kitchen", "7scenes", 0.052)));
+
+// Frames rendered beforehand, so that they come as fast as a camera's.
+class RecordedSource : public FrameSource {
+ public:
+  explicit RecordedSource(std::size_t frames) {
+    SimulatorOptions options;
+    options.traffic = TrafficLevel::kNone;
+    options.frames = frames;
+    SimulatedSource source(options);
+    camera_ = source.camera();
+    while (auto frame = source.next()) frames_.push_back(*frame);
+  }
+  std::optional<Frame> next() override {
+    return position_ < frames_.size() ? std::make_optional(frames_[position_++]) : std::nullopt;
+  }
+  const Camera& camera() const override { return camera_; }
+  void rewind() { position_ = 0; }
+
+ private:
+  Camera camera_;
+  std::vector<Frame> frames_;
+  std::size_t position_ = 0;
+};
+
+TEST(Slam, RealTimeModeAccountsForEveryFrame) {
+  RecordedSource source(40);
+  Slam slam(source.camera(), {}, Mode::kRealTime);
+  const RunSummary summary = run(source, slam);
+  EXPECT_EQ(slam.frames() + summary.dropped, 40U);
+  EXPECT_EQ(slam.trajectory().size(), slam.frames());
+  EXPECT_GT(summary.wall_seconds, 39.0 / 30.0 - 0.01) << "frames must not come earlier than their timestamps say";
+  EXPECT_LT(evaluate_trajectory(summary.truth, slam.trajectory()).ate.rmse, 0.05);
+}
+
+TEST(Slam, StopsWhenAskedAndKeepsWhatThereIs) {
+  RecordedSource source(30);
+  for (const Mode mode : {Mode::kDeterministic, Mode::kRealTime}) {
+    source.rewind();
+    Slam slam(source.camera(), {}, mode);
+    std::stop_source stop;
+    const auto stop_after_ten = [&](const FrameResult& frame) {
+      if (frame.index >= 9) stop.request_stop();
+    };
+    const RunSummary summary = run(source, slam, stop_after_ten, stop.get_token());
+    EXPECT_TRUE(summary.interrupted);
+    EXPECT_LE(slam.frames(), 12U);
+    EXPECT_EQ(slam.trajectory().size(), slam.frames());
+  }
+}
+
+TEST(Slam, RefusesAbsurdCalibrationAndOptions) {
+  Camera camera;
+  camera.fx = -1.0;
+  EXPECT_THROW(Slam{camera}, CalibrationError);
+  Options options;
+  options.orb.features = 0;
+  EXPECT_THROW(Slam(Camera{}, options), OptionsError);
+}
+
+TEST(Slam, WaitsForDepthBeforeItStarts) {
+  SimulatorOptions simulation;
+  simulation.traffic = TrafficLevel::kNone;
+  Simulator simulator(simulation);
+  Slam slam(simulator.camera());
+  Frame blind = simulator.render(0).frame;
+  blind.depth.release();
+  EXPECT_EQ(slam.process(blind)->state, TrackingState::kInitialising);
+  EXPECT_EQ(slam.process(simulator.render(1).frame)->state, TrackingState::kTracking);
+  EXPECT_EQ(slam.trajectory().size(), 1U);
+}
+
+TEST(Slam, UsesNothingUnderTheMask) {
+  SimulatorOptions simulation;
+  Simulator simulator(simulation);
+  Slam slam(simulator.camera());
+  const Frame frame = simulator.render(0).frame;
+  cv::Mat mask = cv::Mat::zeros(frame.colour.size(), CV_8UC1);
+  mask.colRange(0, 320) = 255;
+  ASSERT_TRUE(slam.process(frame, mask)->is_keyframe);
+  ASSERT_GT(slam.map().landmark_count(), 100U);
+  for (const Eigen::Vector2f& pixel : slam.map().find(KeyframeId{0})->view->pixels) EXPECT_GT(pixel.x(), 320.0F);
+}
+
+}  // namespace
+}  // namespace roslam

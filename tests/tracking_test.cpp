@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "roslam/error.hpp"
+#include "roslam/geometry/reprojection.hpp"
+#include "roslam/tracking/pose_optimiser.hpp"
+#include "roslam/tracking/projection_matcher.hpp"
+
+namespace roslam {
+namespace {
+
+constexpr double kDegree = 3.14159265358979 / 180.0;
+
+TEST(ReprojectionError, JacobianAgreesWithNumericOne) {
+  const Camera camera = *camera_preset("tum-fr1");
+  const MeasurementNoise noise;
+  for (const float depth : {0.0F, 2.2F}) {
+    const Measurement measurement = Measurement::make({300.0F, 200.0F}, depth, 1.44F, noise);
+    const ReprojectionError term{camera, measurement};
+    const Eigen::Vector3d point(0.3, -0.2, 2.0);
+    const Eigen::Matrix3d analytic = term.jacobian(point);
+    constexpr double kStep = 1e-6;
+    for (int c = 0; c < 3; ++c) {
+      const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(c);
+      const Eigen::Vector3d numeric = (term.error(point + step) - term.error(point - step)) / (2 * kStep);
+      EXPECT_LT((analytic.col(c) - numeric).norm(), 1e-5 * (1.0 + numeric.norm())) << "column " << c;
+    }
+  }
+}
+
+TEST(ReprojectionError, IsZeroAtTheTruthAndOneSigmaOff) {
+  const Camera camera;
+  MeasurementNoise noise;
+  noise.pixel_sigma = 2.0;
+  const Eigen::Vector3d point(0.5, 0.25, 2.0);
+  const Measurement exact = Measurement::make(camera.project(point).cast<float>(), 2.0F, 1.0F, noise);
+  EXPECT_LT((ReprojectionError{camera, exact}.error(point)).norm(), 1e-4);
+  const Measurement shifted =
+      Measurement::make((camera.project(point) + Eigen::Vector2d(2.0, 0.0)).cast<float>(), 2.0F, 1.0F, noise);
+  EXPECT_NEAR((ReprojectionError{camera, shifted}.error(point)).x(), -1.0, 1e-4);
+}
+
+TEST(MeasurementNoise, DepthCountsLessFarAway) {
+  const MeasurementNoise noise;
+  const Measurement near = Measurement::make({0, 0}, 1.0F, 1.0F, noise);
+  const Measurement far = Measurement::make({0, 0}, 6.0F, 1.0F, noise);
+  EXPECT_GT(near.depth_weight, 3.0 * far.depth_weight);
+  EXPECT_FALSE(Measurement::make({0, 0}, 0.0F, 1.0F, noise).has_depth());
+}
+
+// Points in a box before the camera, seen from a known pose.
+class PoseOptimiser : public testing::Test {
+ protected:
+  std::vector<PoseMeasurement> measure(int count, double pixel_noise, double outlier_share, bool with_depth) {
+    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+    std::normal_distribution<double> normal;
+    std::vector<PoseMeasurement> measurements;
+    while (static_cast<int>(measurements.size()) < count) {
+      const Eigen::Vector3d in_camera(2.0 * uniform(generator_), 1.5 * uniform(generator_),
+                                      3.0 + 1.5 * uniform(generator_));
+      Eigen::Vector2d pixel = camera_.project(in_camera);
+      double depth = in_camera.z() + noise_.sigma_of_depth(in_camera.z()) * pixel_noise * normal(generator_);
+      pixel += pixel_noise * Eigen::Vector2d(normal(generator_), normal(generator_));
+      if (static_cast<double>(measurements.size()) < outlier_share * count) {
+        pixel += Eigen::Vector2d(60.0 + 100.0 * uniform(generator_), 90.0 * uniform(generator_));
+        depth += 0.8;
+      }
+      measurements.push_back({truth_.inverse() * in_camera,
+                              Measurement::make(pixel.cast<float>(), with_depth ? static_cast<float>(depth) : 0.0F,
+                                                1.0F, noise_)});
+    }
+    return measurements;
+  }
+
+  SE3 disturbed() const {
+    Vector6d off;
+    off << 0.05, -0.04, 0.06, 2 * kDegree, -1 * kDegree, 2 * kDegree;
+    return SE3::exp(off) * truth_;
+  }
+
+  double translation_error(const SE3& pose) const { return (truth_ * pose.inverse()).translation().norm(); }
+  double rotation_error(const SE3& pose) const { return (truth_ * pose.inverse()).angle(); }
+
+  Camera camera_;
+  MeasurementNoise noise_;
+  std::mt19937 generator_{7};
+  SE3 truth_ = SE3::exp((Vector6d() << 0.4, -1.0, 0.3, 0.2, -0.4, 0.1).finished());
+};
+
+TEST_F(PoseOptimiser, FindsTheTruthWithoutNoise) {
+  for (const bool with_depth : {true, false}) {
+    const auto pose = optimise_pose(camera_, measure(60, 0.0, 0.0, with_depth), disturbed());
+    EXPECT_EQ(pose.inliers, 60);
+    EXPECT_LT(translation_error(pose.T_camera_world), 1e-4);
+    EXPECT_LT(rotation_error(pose.T_camera_world), 1e-4);
+  }
+}
+
+TEST_F(PoseOptimiser, StaysNearTheTruthWithNoise) {
+  const auto pose = optimise_pose(camera_, measure(300, 1.0, 0.0, true), disturbed());
+  EXPECT_LT(translation_error(pose.T_camera_world), 0.005);
+  EXPECT_LT(rotation_error(pose.T_camera_world), 0.1 * kDegree);
+  EXPECT_GT(pose.inliers, 290);
+}
+
+TEST_F(PoseOptimiser, SetsOutliersAside) {
+  const auto measurements = measure(300, 1.0, 0.3, true);
+  const auto pose = optimise_pose(camera_, measurements, disturbed());
+  EXPECT_LT(translation_error(pose.T_camera_world), 0.006);
+  int outliers_kept = 0;
+  for (std::size_t i = 0; i < 90; ++i) outliers_kept += pose.is_inlier[i] ? 1 : 0;
+  EXPECT_LE(outliers_kept, 1);
+  EXPECT_GT(pose.inliers, 200);
+}
+
+TEST_F(PoseOptimiser, SaysSoWhenThereIsTooLittle) {
+  const auto pose = optimise_pose(camera_, measure(2, 0.0, 0.0, true), disturbed());
+  EXPECT_EQ(pose.inliers, 0);
+  EXPECT_EQ(optimise_pose(camera_, {}, truth_).inliers, 0);
+}
+
+TEST_F(PoseOptimiser, PointsBehindTheCameraAreOutliers) {
+  auto measurements = measure(50, 0.0, 0.0, true);
+  for (std::size_t i = 0; i < 10; ++i) {
+    const Eigen::Vector3d in_camera = truth_ * measurements[i].point_world;
+    measurements[i].point_world = truth_.inverse() * Eigen::Vector3d(in_camera.x(), in_camera.y(), -in_camera.z());
+  }
+  const auto pose = optimise_pose(camera_, measurements, disturbed());
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_FALSE(pose.is_inlier[i]);
+  EXPECT_EQ(pose.inliers, 40);
+}
+
+TEST(ConsistentRotation, KeepsTheMajority) {
+  std::vector<float> turns(50, 12.0F);
+  turns.push_back(130.0F);
+  turns.push_back(-90.0F);
+  const auto keep = consistent_rotation(turns);
+  for (std::size_t i = 0; i < 50; ++i) EXPECT_TRUE(keep[i]);
+  EXPECT_FALSE(keep[50]);
+  EXPECT_FALSE(keep[51]);
+  EXPECT_TRUE(consistent_rotation({}).empty());
+}
+
+TEST(ConsistentRotation, WrapsAround) {
+  const auto keep = consistent_rotation({1.0F, 361.0F, -359.0F, 721.0F});
+  for (const bool kept : keep) EXPECT_TRUE(kept);
+}
+
+TEST(MatchDescriptors, MatchesEachPointOnce) {
+  std::mt19937_64 generator(9);
+  ObservedFrame a;
+  for (int i = 0; i < 40; ++i) a.descriptors.push_back({generator(), generator(), generator(), generator()});
+  a.pixels.resize(40);
+  ObservedFrame b = a;
+  std::reverse(b.descriptors.begin(), b.descriptors.end());
+  std::vector<std::uint32_t> from{3, 5, 39};
+  const auto pairs = match_descriptors(a, from, b, {});
+  ASSERT_EQ(pairs.size(), 3U);
+  for (const auto& [in_a, in_b] : pairs) EXPECT_EQ(in_b, 39 - in_a);
+  b.descriptors[0] = b.descriptors[1];  // two equally good: ambiguous, so no match
+  b.descriptors[39 - 3] = b.descriptors[39 - 5];
+  EXPECT_LT(match_descriptors(a, from, b, {}).size(), 3U);
+}
+
+}  // namespace
+}  // namespace roslam
