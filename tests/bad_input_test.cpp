@@ -62,7 +62,8 @@ TEST_F(BadLists, NamesTheListThatIsEmpty) {
 }
 
 TEST_F(BadLists, ReadsListsFromWindowsWithCommentsAndBlankLines) {
-  put(data_ / "rgb.txt", "\xef\xbb\xbf# made by an editor\r\n\r\n \t\r\n  # indented\r\n" + text_of(colour_, "\r\n"));
+  put(data_ / "rgb.txt",
+      "\xef\xbb\xbf# made by an editor\r\n\r\n \t\r\n  # indented\r\n" + text_of(colour_, "\r\n"));
   put(data_ / "depth.txt", "\xef\xbb\xbf" + depth_[0].time + "\t" + depth_[0].file + "\r\n" +
                                text_of({depth_.begin() + 1, depth_.end()}, "\r\n"));
   const json frames = frames_of_run();
@@ -71,9 +72,9 @@ TEST_F(BadLists, ReadsListsFromWindowsWithCommentsAndBlankLines) {
 }
 
 TEST_F(BadLists, SkipsAndCountsTimesOutOfOrder) {
-  colour_[2].time = "99999.0";         // the clock jumps and comes back
-  colour_[4].time = colour_[3].time;   // stands still
-  colour_[6].time = "0.000001";        // jumps back
+  colour_[2].time = "99999.0";        // the clock jumps and comes back
+  colour_[4].time = colour_[3].time;  // stands still
+  colour_[6].time = "0.000001";       // jumps back
   colour_[7].time = "nan";
   colour_[8].time = "inf";
   write_lists();
@@ -151,8 +152,9 @@ TEST_F(BadImages, AllMissingIsAnErrorAndTheReportSaysSo) {
 
 TEST_F(BadImages, AllOfAnotherSizeThanTheCameraIsAnErrorWithBothSizes) {
   put(scratch_ / "small.yaml", "width: 320\nheight: 240\nfx: 190\nfy: 190\ncx: 160\ncy: 120\n");
-  expect_refused(run("", (scratch_ / "small.yaml").string()),
-                 {"10 x colour image is 640x480 but the camera 320x240 pixels", "check the images and --camera"});
+  expect_refused(
+      run("", (scratch_ / "small.yaml").string()),
+      {"10 x colour image is 640x480 but the camera 320x240 pixels", "check the images and --camera"});
   EXPECT_EQ(report()["frames"]["processed"], 0);
 }
 
@@ -161,7 +163,8 @@ TEST_F(BadImages, AllBlackIsAnErrorAndAllIsWritten) {
   expect_refused(run(), {data_.string(), "no frame could be tracked", "corners of known depth"});
   EXPECT_EQ(report()["frames"]["by_state"], json({{"initialising", kFrames}}));
   EXPECT_EQ(report()["frames"]["tracked"], 0);
-  for (const char* file : {"trajectory.txt", "keyframes.txt", "map.ply"}) EXPECT_TRUE(fs::exists(run_ / file)) << file;
+  for (const char* file : {"trajectory.txt", "keyframes.txt", "map.ply"})
+    EXPECT_TRUE(fs::exists(run_ / file)) << file;
 }
 
 TEST_F(BadDepth, FramesWithDamagedDepthAreTrackedWithoutIt) {

@@ -31,13 +31,31 @@ std::string camera_with(const std::string& key, const std::string& value) {
 }
 
 TEST_F(BadSettings, CameraFileAndKeyAreNamed) {
-  for (const auto& [key, value] : std::vector<std::pair<std::string, std::string>>{
-           {"fx", "0"}, {"fx", "-385"}, {"fy", ".nan"}, {"fx", ".inf"}, {"fx", "1e9"}, {"cx", ".nan"}, {"cy", "9999"},
-           {"width", "0"}, {"height", "-480"}, {"width", "640.5"}, {"width", "wide"}, {"fx", "[385]"}, {"fy", ""},
-           {"depth_units_per_metre", "0"}, {"depth_units_per_metre", "-1000"}, {"depth_units_per_metre", ".nan"},
-           {"fps", "0"}, {"fps", ".nan"}, {"distortion", "[.nan, 0]"}, {"distortion", "[1, 2, 3, 4, 5, 6]"},
-           {"distortion", "0.1"}, {"distortion", "[900, -900, 900, 900, 900]"}, {"distortion", "[-5, 0]"},
-           {"focal_length", "385"}}) {
+  for (const auto& [key, value] :
+       std::vector<std::pair<std::string, std::string>>{{"fx", "0"},
+                                                        {"fx", "-385"},
+                                                        {"fy", ".nan"},
+                                                        {"fx", ".inf"},
+                                                        {"fx", "1e9"},
+                                                        {"cx", ".nan"},
+                                                        {"cy", "9999"},
+                                                        {"width", "0"},
+                                                        {"height", "-480"},
+                                                        {"width", "640.5"},
+                                                        {"width", "wide"},
+                                                        {"fx", "[385]"},
+                                                        {"fy", ""},
+                                                        {"depth_units_per_metre", "0"},
+                                                        {"depth_units_per_metre", "-1000"},
+                                                        {"depth_units_per_metre", ".nan"},
+                                                        {"fps", "0"},
+                                                        {"fps", ".nan"},
+                                                        {"distortion", "[.nan, 0]"},
+                                                        {"distortion", "[1, 2, 3, 4, 5, 6]"},
+                                                        {"distortion", "0.1"},
+                                                        {"distortion", "[900, -900, 900, 900, 900]"},
+                                                        {"distortion", "[-5, 0]"},
+                                                        {"focal_length", "385"}}) {
     expect_refused(run("", file(camera_with(key, value))), {"settings.yaml", key});
   }
   expect_refused(run("", file(camera_with("model", "fisheye"))), {"settings.yaml", "fisheye", "use pinhole"});
@@ -86,17 +104,20 @@ TEST_F(BadSettings, PrintedConfigurationReadsBack) {
 
 TEST_F(BadSettings, SimulatedFlightsAreCheckedToo) {
   const std::string out = " --quiet --out '" + run_.string() + "'";
+  expect_refused(run("--frames 5"), {"--frames", "simulated flight"});
   expect_refused(run_program("run simulated:river" + out, scratch_), {"simulated:river", "simulated:street"});
   expect_refused(run_program("run simulated:street --camera tum-fr1" + out, scratch_), {"--camera tum-fr1"});
 }
 
 TEST_F(BadSettings, WrongUsageExitsWithTwo) {
-  const std::string good = "run '" + data_.string() + "' --camera simulated --quiet --out '" + run_.string() + "' ";
+  const std::string good =
+      "run '" + data_.string() + "' --camera simulated --quiet --out '" + run_.string() + "' ";
   for (const std::string& arguments :
-       {std::string(), std::string("fly"), std::string("run"), "run '" + data_.string() + "' --camera simulated",
+       {std::string(), std::string("fly"), std::string("run"),
+        "run '" + data_.string() + "' --camera simulated",
         "run --camera simulated --out '" + run_.string() + "'", good + "--unknown", good + "another",
         good + "--deterministic --real-time", good + "--frames -1", good + "--frames few", good + "--seed x",
-        good + "--traffic dense"}) {
+        good + "--seed -1", good + "--traffic dense"}) {
     const Outcome outcome = run_program(arguments, scratch_);
     EXPECT_EQ(outcome.code, 2) << arguments;
     EXPECT_NE(outcome.error, "") << arguments;
@@ -115,7 +136,8 @@ TEST_F(BadSettings, EvaluationSkipsAndCountsUnusableTruth) {
   }
   put(data_ / "groundtruth.txt", truth.str());
   put(run_ / "trajectory.txt", estimate.str());
-  const std::string both = "evaluate trajectory --truth '" + data_.string() + "' --estimate '" + run_.string() + "'";
+  const std::string both =
+      "evaluate trajectory --truth '" + data_.string() + "' --estimate '" + run_.string() + "'";
   const Outcome outcome = run_program(both + " --json", scratch_);
   EXPECT_EQ(outcome.code, 0) << outcome.error;
   EXPECT_NE(outcome.error.find("3 lines left out"), std::string::npos) << outcome.error;
@@ -123,7 +145,7 @@ TEST_F(BadSettings, EvaluationSkipsAndCountsUnusableTruth) {
   put(data_ / "groundtruth.txt", "1 0 0 0 nan nan nan nan\n2 0 0 0 3 3 3 3\n");
   expect_refused(run_program(both, scratch_), {"groundtruth.txt", "holds no pose"});
   put(run_ / "trajectory.txt", "# timestamp tx ty tz qx qy qz qw\n");
-  put(data_ / "groundtruth.txt", truth.str());
+  put(data_ / "groundtruth.txt", estimate.str());
   expect_refused(run_program(both, scratch_), {"trajectory.txt", "holds no pose"});
 }
 

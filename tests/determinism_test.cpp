@@ -14,8 +14,8 @@ class Deterministic : public Dataset {
   // Runs twice and compares all results but run.json, which holds times.
   void expect_same_bytes(const fs::path& data, const std::string& camera) const {
     for (const char* out : {"one", "two"}) {
-      const Outcome outcome = run_program("run '" + data.string() + "' --quiet --deterministic --camera " + camera +
-                                              " --out '" + (scratch_ / out).string() + "'",
+      const Outcome outcome = run_program("run '" + data.string() + "' --quiet --deterministic --camera " +
+                                              camera + " --out '" + (scratch_ / out).string() + "'",
                                           scratch_);
       ASSERT_EQ(outcome.code, 0) << outcome.error;
     }
@@ -45,7 +45,8 @@ TEST_F(Deterministic, OnARecordedSequence) {
     for (int i = 0; i < kLines && std::getline(in, line); ++i) text += line + "\n";
     put(data_ / list, text);
   }
-  for (const char* images : {"rgb", "depth"}) fs::create_directory_symlink(fs::canonical(recorded / images), data_ / images);
+  for (const char* images : {"rgb", "depth"})
+    fs::create_directory_symlink(fs::canonical(recorded / images), data_ / images);
   expect_same_bytes(data_, "tum-fr1");
 }
 

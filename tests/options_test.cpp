@@ -69,7 +69,8 @@ TEST_F(OptionsFile, EveryFieldSurvivesWritingAndReading) {
   int fields = 0;
   int differing = 0;
   std::vector<double> defaults;
-  for_each_option(default_options, [&](const char*, const char*, const auto& field) { defaults.push_back(field); });
+  for_each_option(default_options,
+                  [&](const char*, const char*, const auto& field) { defaults.push_back(field); });
   std::vector<double> values;
   for_each_option(options, [&](const char*, const char*, const auto& field) { values.push_back(field); });
   const Options again = read(options_to_yaml(options));
@@ -129,8 +130,10 @@ TEST_F(OptionsFile, NoFieldAcceptsWhatIsNotANumber) {
 TEST_F(OptionsFile, NamesUnknownAndRepeatedKeys) {
   EXPECT_NE(refusal("orb:\n  feature: 5\n").find("unknown key 'orb.feature'"), std::string::npos);
   EXPECT_NE(refusal("orbs:\n  features: 5\n").find("unknown section 'orbs'"), std::string::npos);
-  EXPECT_NE(refusal("orb:\n  features: 500\n  features: 600\n").find("'orb.features' is given twice"), std::string::npos);
-  EXPECT_NE(refusal("orb:\n  features: 500\norb:\n  levels: 4\n").find("'orb' is given twice"), std::string::npos);
+  EXPECT_NE(refusal("orb:\n  features: 500\n  features: 600\n").find("'orb.features' is given twice"),
+            std::string::npos);
+  EXPECT_NE(refusal("orb:\n  features: 500\norb:\n  levels: 4\n").find("'orb' is given twice"),
+            std::string::npos);
   EXPECT_NE(refusal("orb: 5\n").find("'orb' must hold"), std::string::npos);
   EXPECT_NE(refusal("[orb]: 5\n").find("a key must be a word"), std::string::npos);
   EXPECT_NE(refusal("- orb\n").find("sections"), std::string::npos);

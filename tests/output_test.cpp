@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Results that cannot be written, runs that are interrupted: what was computed is kept.
-#include <gtest/gtest.h>
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <spawn.h>
 #include <sys/mount.h>
 #include <unistd.h>
@@ -22,7 +22,8 @@ constexpr std::array<const char*, 5> kResults{"trajectory.txt", "keyframes.txt",
 class Output : public Dataset {
  protected:
   Outcome run_to(const std::string& out) const {
-    return run_program("run '" + data_.string() + "' --quiet --camera simulated --out '" + out + "'", scratch_);
+    return run_program("run '" + data_.string() + "' --quiet --camera simulated --out '" + out + "'",
+                       scratch_);
   }
 };
 
@@ -64,7 +65,8 @@ TEST_F(Output, ReportThatCannotBeWrittenIsNoticedBeforeTheWork) {
 
 TEST_F(Output, DiskThatFillsUpIsReported) {
   fs::create_directories(run_);
-  if (mount("tmpfs", run_.c_str(), "tmpfs", 0, "size=12k") != 0) GTEST_SKIP() << "mounting is not allowed here";
+  if (mount("tmpfs", run_.c_str(), "tmpfs", 0, "size=12k") != 0)
+    GTEST_SKIP() << "mounting is not allowed here";
   const Outcome outcome = run();
   const std::string trajectory = content(run_ / "trajectory.txt");
   EXPECT_EQ(umount(run_.c_str()), 0);
@@ -99,8 +101,8 @@ TEST_F(Output, ResultsOfAnEarlierRunDoNotStay) {
 TEST_F(Output, NamesInAnotherEncodingDoNotCostTheRun) {
   const fs::path odd = scratch_ / "fl\xfcg";  // Latin-1
   fs::rename(data_, odd);
-  const Outcome outcome = run_program("run '" + odd.string() + "' --json --camera simulated --out '" + run_.string() + "'",
-                                      scratch_);
+  const Outcome outcome = run_program(
+      "run '" + odd.string() + "' --json --camera simulated --out '" + run_.string() + "'", scratch_);
   EXPECT_EQ(outcome.code, 0) << outcome.error;
   EXPECT_EQ(report()["frames"]["tracked"], kFrames);
   EXPECT_EQ(nlohmann::json::parse(outcome.out)["frames"]["tracked"], kFrames);
@@ -136,7 +138,8 @@ class Interrupt : public Dataset, public testing::WithParamInterface<const char*
 
 TEST_P(Interrupt, EndsSoonAndWritesWhatIsThere) {
   const int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
-  if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0) GTEST_SKIP() << "no pseudo terminal here";
+  if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0)
+    GTEST_SKIP() << "no pseudo terminal here";
   const int program_end = open(ptsname(terminal), O_RDWR | O_NOCTTY | O_CLOEXEC);
   ASSERT_GE(program_end, 0);
   const pid_t process = start(program_end);

@@ -19,9 +19,9 @@
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/sources/tum_source.hpp"
 
-/// Tests on a short flight along the simulated street without traffic. The program record_street renders it once for
-/// all of them (a CTest fixture), since that takes longer than the tests themselves: frames 0 to 59 and, after a gap,
-/// 85 to 99, at 30 a second.
+/// Tests on a short flight along the simulated street without traffic. The program record_street renders it
+/// once for all of them (a CTest fixture), since that takes longer than the tests themselves: frames 0 to 59
+/// and, after a gap, 85 to 99, at 30 a second.
 namespace roslam::street {
 
 namespace fs = std::filesystem;
@@ -68,7 +68,8 @@ struct Outcome {
 };
 
 /// Runs the program and waits for it.
-inline Outcome run_program(const std::string& arguments, const fs::path& scratch, const std::string& to = "") {
+inline Outcome run_program(const std::string& arguments, const fs::path& scratch,
+                           const std::string& to = "") {
   const std::string out = to.empty() ? (scratch / "stdout").string() : to;
   const std::string error = (scratch / "stderr").string();
   const int status =
@@ -81,11 +82,12 @@ inline void expect_refused(const Outcome& outcome, const std::vector<std::string
   EXPECT_EQ(outcome.code, 1) << outcome.error;
   EXPECT_EQ(outcome.out, "");
   EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
-  for (const auto& word : words) EXPECT_NE(outcome.error.find(word), std::string::npos) << word << ": " << outcome.error;
+  for (const auto& word : words)
+    EXPECT_NE(outcome.error.find(word), std::string::npos) << word << ": " << outcome.error;
 }
 
-/// A copy of the first frames of the street in the TUM format, for a test to damage. Images may be replaced by put()
-/// and removed, lists are written by write_lists().
+/// A copy of the first frames of the street in the TUM format, for a test to damage. Images may be replaced
+/// by put() and removed, lists are written by write_lists().
 class Dataset : public testing::Test {
  protected:
   struct Line {
@@ -128,13 +130,14 @@ class Dataset : public testing::Test {
   fs::path depth(std::size_t i) const { return data_ / depth_[i].file; }
 
   Outcome run(const std::string& arguments = "", const std::string& camera = "simulated") const {
-    return run_program("run '" + data_.string() + "' --quiet --camera '" + camera + "' --out '" + run_.string() + "' " +
-                           arguments,
+    return run_program("run '" + data_.string() + "' --quiet --camera '" + camera + "' --out '" +
+                           run_.string() + "' " + arguments,
                        scratch_);
   }
 
   /// Runs, expects success and gives the counts of frames in run.json.
-  nlohmann::json frames_of_run(const std::string& arguments = "", const std::string& camera = "simulated") const {
+  nlohmann::json frames_of_run(const std::string& arguments = "",
+                               const std::string& camera = "simulated") const {
     const Outcome outcome = run(arguments, camera);
     EXPECT_EQ(outcome.code, 0) << outcome.error;
     EXPECT_EQ(outcome.error, "");
@@ -144,9 +147,10 @@ class Dataset : public testing::Test {
   nlohmann::json report() const { return nlohmann::json::parse(content(run_ / "run.json"), nullptr, false); }
   Trajectory trajectory() const { return read_trajectory(run_ / "trajectory.txt").trajectory; }
 
-  const fs::path scratch_ = fs::path(testing::TempDir()) /
-                            (std::string("roslam_") + testing::UnitTest::GetInstance()->current_test_info()->test_suite_name() +
-                             "_" + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const fs::path scratch_ =
+      fs::path(testing::TempDir()) /
+      (std::string("roslam_") + testing::UnitTest::GetInstance()->current_test_info()->test_suite_name() +
+       "_" + testing::UnitTest::GetInstance()->current_test_info()->name());
   const fs::path data_ = scratch_ / "data";
   const fs::path run_ = scratch_ / "run";
   std::vector<Line> colour_;

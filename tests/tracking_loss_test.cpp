@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <memory>
+#include <ostream>
 
 #include "roslam/error.hpp"
 #include "roslam/pipeline/run.hpp"
@@ -27,7 +29,8 @@ class Street : public testing::Test {
   }
 
   // Frames of the flight from begin to end, with blank ones where the flight has none or for [gap, gap_end).
-  static std::vector<Frame> with_blank(std::size_t gap, std::size_t gap_end, std::size_t end, const cv::Scalar& colour) {
+  static std::vector<Frame> with_blank(std::size_t gap, std::size_t gap_end, std::size_t end,
+                                       const cv::Scalar& colour) {
     std::vector<Frame> sequence;
     for (const auto& frame : *frames_) {
       if (frame.index < gap) sequence.push_back(frame);
@@ -53,6 +56,8 @@ struct Blank {
   const char* name;
   cv::Scalar colour;
   std::size_t count;
+
+  friend std::ostream& operator<<(std::ostream& out, const Blank& blank) { return out << blank.name; }
 };
 
 class BlankFrames : public Street, public testing::WithParamInterface<Blank> {};
@@ -89,11 +94,12 @@ TEST_P(BlankFrames, AreReportedAsLostAndTheMapServesAgain) {
   EXPECT_EQ(slam.trajectory().size(), kGap + recovered);
 }
 
-INSTANTIATE_TEST_SUITE_P(Lengths, BlankFrames,
-                         testing::Values(Blank{"black10", cv::Scalar::all(0), 10}, Blank{"white10", cv::Scalar::all(255), 10},
-                                         Blank{"grey10", cv::Scalar::all(128), 10}, Blank{"black60", cv::Scalar::all(0), 60},
-                                         Blank{"white60", cv::Scalar::all(255), 60}, Blank{"grey60", cv::Scalar::all(128), 60}),
-                         [](const auto& tested) { return std::string(tested.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Lengths, BlankFrames,
+    testing::Values(Blank{"black10", cv::Scalar::all(0), 10}, Blank{"white10", cv::Scalar::all(255), 10},
+                    Blank{"grey10", cv::Scalar::all(128), 10}, Blank{"black60", cv::Scalar::all(0), 60},
+                    Blank{"white60", cv::Scalar::all(255), 60}, Blank{"grey60", cv::Scalar::all(128), 60}),
+    [](const auto& tested) { return std::string(tested.param.name); });
 
 TEST_F(Street, TrackingGoesOnWhileDepthIsMissing) {
   Slam slam(*camera_preset("simulated"));
@@ -108,7 +114,8 @@ TEST_F(Street, TrackingGoesOnWhileDepthIsMissing) {
     if (!result->T_world_camera) continue;
     if (!first) first = result->T_world_camera;
     ++tracked;
-    EXPECT_LT((truth(given, *first).inverse() * *result->T_world_camera).translation().norm(), 0.1) << frame.index;
+    EXPECT_LT((truth(given, *first).inverse() * *result->T_world_camera).translation().norm(), 0.1)
+        << frame.index;
   }
   RecordProperty("tracked", static_cast<int>(tracked));
   EXPECT_EQ(tracked, kBeforeGap);
@@ -143,7 +150,8 @@ TEST_F(Street, DepthThatIsPartlyAbsurdDoesNotSpoilTheRest) {
     ASSERT_TRUE(result && result->T_world_camera) << i;
     EXPECT_TRUE(result->T_world_camera->is_finite());
   }
-  for (const LandmarkId id : slam.map().landmark_ids()) EXPECT_TRUE(slam.map().find(id)->position.allFinite());
+  for (const LandmarkId id : slam.map().landmark_ids())
+    EXPECT_TRUE(slam.map().find(id)->position.allFinite());
 }
 
 TEST_F(Street, FramesOfWrongTypeAreRefusedAndCounted) {

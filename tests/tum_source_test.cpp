@@ -21,7 +21,8 @@ std::vector<TimedFile> at(const std::vector<double>& times) {
   return files;
 }
 
-std::vector<int> pairs(const std::vector<double>& colour, const std::vector<double>& depth, double tolerance = 0.02) {
+std::vector<int> pairs(const std::vector<double>& colour, const std::vector<double>& depth,
+                       double tolerance = 0.02) {
   return associate(at(colour), at(depth), tolerance);
 }
 
@@ -105,7 +106,8 @@ TEST_F(TumFolder, GivesColourAsBgrWhateverItsFormat) {
 
 TEST_F(TumFolder, DividesDepthByTheFactorOfTheCamera) {
   write("1 colour.png\n", "1 depth.png\n");
-  for (const auto& [units, metres] : {std::pair{1000.0, 2.5F}, {5000.0, 0.5F}, {2500.0, 1.0F}, {1.0, 2500.0F}}) {
+  for (const auto& [units, metres] :
+       {std::pair{1000.0, 2.5F}, {5000.0, 0.5F}, {2500.0, 1.0F}, {1.0, 2500.0F}}) {
     camera_.depth_units_per_metre = units;
     TumSource source(folder_, camera_);
     const auto frame = source.next();

@@ -132,8 +132,12 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command->add_option("--traffic", arguments->source.traffic, "Of a simulated flight: none, light or heavy")
       ->check(CLI::IsMember({"none", "light", "heavy"}))
       ->capture_default_str();
-  command->add_option("--frames", arguments->source.frames, "Of a simulated flight; 0 = all")->capture_default_str();
-  command->add_option("--seed", arguments->source.seed, "Of a simulated flight")->capture_default_str();
+  command->add_option("--frames", arguments->source.frames, "Of a simulated flight; 0 = all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--seed", arguments->source.seed, "Of a simulated flight")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   command->add_flag("--print-config", arguments->print_config, "Print the effective options and stop");
   command->add_flag("--quiet", arguments->quiet, "No progress");
   command->add_flag("--json", arguments->json, "Print the report as one JSON object");

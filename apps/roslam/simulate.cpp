@@ -219,7 +219,9 @@ void add_simulate_command(CLI::App& program) {
       ->add_option("--depth", arguments->depth, "ideal, or d455: with the noise and holes of such a camera")
       ->check(CLI::IsMember({"ideal", "d455"}))
       ->capture_default_str();
-  command->add_option("--seed", arguments->seed, "Another number makes another city")->capture_default_str();
+  command->add_option("--seed", arguments->seed, "Another number makes another city")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print a summary as one JSON object");
   command->callback([arguments] { simulate(*arguments); });
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/sources.hpp"
 
+#include <string>
+
 #include "roslam/error.hpp"
 #include "roslam/sources/simulated_source.hpp"
 #include "roslam/sources/tum_source.hpp"
@@ -32,6 +34,10 @@ std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
   if (arguments.camera.empty()) {
     throw InputError(arguments.name +
                      ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a file");
+  }
+  if (arguments.frames != 0) {
+    throw InputError("--frames " + std::to_string(arguments.frames) +
+                     ": is for a simulated flight only; leave it out with a recording");
   }
   return std::make_unique<TumSource>(arguments.name, load_camera(arguments.camera));
 }

@@ -28,11 +28,12 @@ FeatureGrid::FeatureGrid(std::span<const Eigen::Vector2f> points, const std::arr
 }
 
 int FeatureGrid::column(float x) const {
-  return std::clamp(static_cast<int>(std::floor((x - min_.x()) * cells_per_pixel_.x())), 0, kColumns - 1);
+  // Clamped first: a pixel may lie farther outside than an int can say.
+  return static_cast<int>(std::clamp((x - min_.x()) * cells_per_pixel_.x(), 0.0F, kColumns - 1.0F));
 }
 
 int FeatureGrid::row(float y) const {
-  return std::clamp(static_cast<int>(std::floor((y - min_.y()) * cells_per_pixel_.y())), 0, kRows - 1);
+  return static_cast<int>(std::clamp((y - min_.y()) * cells_per_pixel_.y(), 0.0F, kRows - 1.0F));
 }
 
 void FeatureGrid::find(const Eigen::Vector2f& centre, float radius, std::vector<std::uint32_t>& result) const {

@@ -15,6 +15,22 @@ void require(bool condition, const std::string& message) {
   if (!condition) throw CalibrationError("camera calibration: " + message);
 }
 
+// True if distortion can be undone in all but a few pixels, say those of an extreme corner.
+bool is_invertible(const Camera& camera) {
+  constexpr int kSteps = 16;  // along each side of a grid over the image
+  constexpr int kFewPoints = (kSteps + 1) * (kSteps + 1) / 10;
+  constexpr double kTolerance = 0.5;  // pixels
+  int failures = 0;
+  for (int i = 0; i <= kSteps; ++i) {
+    for (int j = 0; j <= kSteps; ++j) {
+      const Eigen::Vector2d taken((camera.width - 1.0) * i / kSteps, (camera.height - 1.0) * j / kSteps);
+      const Eigen::Vector2d back = camera.distort(camera.undistort(taken));
+      if (!((back - taken).norm() < kTolerance)) ++failures;
+    }
+  }
+  return failures <= kFewPoints;
+}
+
 bool positive(double value) { return std::isfinite(value) && value > 0.0; }
 }  // namespace
 
@@ -32,6 +48,7 @@ void Camera::validate() const {
   for (const double k : distortion) {
     require(std::isfinite(k) && std::abs(k) < 1000.0, "distortion must be five finite numbers k1 k2 p1 p2 k3" + got);
   }
+  require(is_invertible(*this), "distortion bends the image so much that it cannot be undone" + got);
   require(positive(depth_units_per_metre),
           "depth_units_per_metre must be positive (5000 for TUM, 1000 for millimetres), got " +
               std::to_string(depth_units_per_metre));
@@ -68,7 +85,7 @@ Eigen::Vector2d Camera::undistort(const Eigen::Vector2d& pixel) const {
     if (std::abs(jacobian.determinant()) < 1e-9) break;
     estimate -= jacobian.inverse() * residual;
   }
-  return estimate;
+  return estimate.allFinite() ? estimate : pixel;
 }
 
 std::array<double, 4> Camera::undistorted_bounds() const {
