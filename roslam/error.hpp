@@ -5,7 +5,8 @@
 
 namespace roslam {
 
-/// Base of every exception the library throws. The message is one line that names what is wrong and the remedy.
+/// Base of every exception the library throws. The message is one line that names what is wrong and the
+/// remedy.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

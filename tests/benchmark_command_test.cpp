@@ -10,6 +10,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
+#include "tests/scratch.hpp"
+
 namespace roslam {
 namespace {
 
@@ -30,9 +32,7 @@ std::string content(const fs::path& file) {
 
 class BenchmarkStatic : public testing::Test {
  protected:
-  const fs::path folder_ =
-      fs::path(testing::TempDir()) /
-      (std::string("benchmark_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const fs::path folder_ = scratch_path();
 
   void SetUp() override {
     fs::remove_all(folder_);

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "roslam/geometry/trajectory.hpp"
+#include "tests/scratch.hpp"
 
 namespace roslam {
 namespace {
@@ -32,9 +33,7 @@ std::string content(const fs::path& file) {
 
 class EvaluateTrajectory : public testing::Test {
  protected:
-  const fs::path folder_ =
-      fs::path(testing::TempDir()) /
-      (std::string("evaluate_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const fs::path folder_ = scratch_path();
 
   void SetUp() override {
     fs::remove_all(folder_);

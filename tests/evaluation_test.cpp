@@ -9,6 +9,7 @@
 #include "roslam/evaluation/plot.hpp"
 #include "roslam/evaluation/trajectory_error.hpp"
 #include "roslam/evaluation/trajectory_plot.hpp"
+#include "tests/scratch.hpp"
 
 namespace roslam {
 namespace {
@@ -318,7 +319,7 @@ TEST(Plot, FiguresAreTheSameEachTimeAndSurviveDegenerateInput) {
       plot_trajectory(Trajectory{at(0, 1e9, -1e9, 0), at(1e-9, 1e9, -1e9, 0)}, std::string(500, 'n')));
   EXPECT_THROW(plot_trajectory({}, "none"), InputError);
   if (std::filesystem::exists("/dev/full")) {
-    const auto link = std::filesystem::path(testing::TempDir()) / "full_disk.png";
+    const auto link = scratch_path(".png");
     std::filesystem::remove(link);
     std::filesystem::create_symlink("/dev/full", link);
     EXPECT_THROW(write_png(link, figure), OutputError);

@@ -22,7 +22,8 @@ cv::Mat textured_image(unsigned seed, int width = 640, int height = 480) {
   cv::Mat image(height, width, CV_8UC1, cv::Scalar(128));
   for (int i = 0; i < 1500; ++i) {
     const cv::Point corner(below(width), below(height));
-    cv::rectangle(image, {corner, cv::Size(4 + below(30), 4 + below(30))}, cv::Scalar(below(256)), cv::FILLED);
+    cv::rectangle(image, {corner, cv::Size(4 + below(30), 4 + below(30))}, cv::Scalar(below(256)),
+                  cv::FILLED);
   }
   cv::GaussianBlur(image, image, {3, 3}, 0.8);
   return image;
@@ -106,7 +107,8 @@ TEST(OrbExtractor, SpreadsOverImageAndLevels) {
   std::array<int, 16> quarters{};
   std::array<int, 8> levels{};
   for (const auto& feature : features) {
-    ++quarters[static_cast<std::size_t>(feature.pixel.x / 160) + 4 * static_cast<std::size_t>(feature.pixel.y / 120)];
+    ++quarters[static_cast<std::size_t>(feature.pixel.x / 160) +
+               4 * static_cast<std::size_t>(feature.pixel.y / 120)];
     ++levels[static_cast<std::size_t>(feature.level)];
   }
   for (const int count : quarters) EXPECT_GT(count, 25);  // a sixteenth of 1000 is 62; border cells lose some

@@ -7,6 +7,7 @@
 #include "roslam/error.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/se3.hpp"
+#include "tests/scratch.hpp"
 
 namespace roslam {
 namespace {
@@ -62,7 +63,8 @@ TEST(Camera, UndistortInvertsDistortOverTheWholeImage) {
     for (double x = 0; x < camera.width; x += 31) {
       for (double y = 0; y < camera.height; y += 29) {
         const Eigen::Vector2d pixel(x, y);
-        EXPECT_LT((camera.distort(camera.undistort(pixel)) - pixel).norm(), 1e-5) << name << " " << pixel.transpose();
+        EXPECT_LT((camera.distort(camera.undistort(pixel)) - pixel).norm(), 1e-5)
+            << name << " " << pixel.transpose();
       }
     }
   }
@@ -80,7 +82,7 @@ TEST(Camera, BoundsHoldEveryUndistortedCorner) {
 class CameraFile : public testing::Test {
  protected:
   Camera read(const std::string& text) const {
-    const auto file = std::filesystem::path(testing::TempDir()) / (std::string("camera_test_") + testing::UnitTest::GetInstance()->current_test_info()->name() + ".yaml");
+    const auto file = scratch_path(".yaml");
     std::ofstream(file) << text;
     return read_camera(file);
   }
@@ -107,7 +109,8 @@ TEST_F(CameraFile, RejectsAbsurdCalibration) {
       FAIL() << key << ": " << value << " was accepted";
     } catch (const CalibrationError& error) {
       EXPECT_NE(std::string(error.what()).find(key), std::string::npos) << error.what();
-      EXPECT_NE(std::string(error.what()).find("camera_test_RejectsAbsurdCalibration.yaml"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find(scratch_path(".yaml").string()), std::string::npos)
+          << error.what();
     }
   }
   EXPECT_THROW(read(good_ + "depth_units_per_metre: 0\n"), CalibrationError);

@@ -37,7 +37,8 @@ void check_jacobians(const Measurement& measurement) {
     parameter = value;
     for (std::size_t row = 0; row < kRows; ++row) {
       const double numeric = (plus[row] - minus[row]) / (2 * kStep);
-      EXPECT_NEAR(analytic[static_cast<int>(row) * columns + column], numeric, 1e-4 * (1.0 + std::abs(numeric)))
+      EXPECT_NEAR(analytic[static_cast<int>(row) * columns + column], numeric,
+                  1e-4 * (1.0 + std::abs(numeric)))
           << "row " << row << " column " << column;
     }
   };
@@ -72,9 +73,12 @@ class Bundle : public testing::Test {
         const Eigen::Vector3d in_camera = truth_.poses[i].T_camera_world * truth_.points[p];
         const Eigen::Vector2d pixel =
             camera_.project(in_camera) + noise * Eigen::Vector2d(normal(generator_), normal(generator_));
-        const double depth = in_camera.z() + noise * noise_.sigma_of_depth(in_camera.z()) * normal(generator_);
+        const double depth =
+            in_camera.z() + noise * noise_.sigma_of_depth(in_camera.z()) * normal(generator_);
         truth_.terms.push_back(
-            {i, p, Measurement::make(pixel.cast<float>(), p % 3 == 0 ? 0.0F : static_cast<float>(depth), 1.0F, noise_)});
+            {i, p,
+             Measurement::make(pixel.cast<float>(), p % 3 == 0 ? 0.0F : static_cast<float>(depth), 1.0F,
+                               noise_)});
       }
     }
   }

@@ -9,6 +9,7 @@
 
 #include "roslam/error.hpp"
 #include "roslam/pipeline/options_fields.hpp"
+#include "tests/scratch.hpp"
 
 namespace roslam {
 namespace {
@@ -33,7 +34,7 @@ class OptionsFile : public testing::Test {
     return "accepted";
   }
 
-  const fs::path file_ = fs::path(testing::TempDir()) / "roslam_options_test.yaml";
+  const fs::path file_ = scratch_path(".yaml");
 };
 
 bool accepts(const Options& options) {

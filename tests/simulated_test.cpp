@@ -15,6 +15,7 @@
 #include "roslam/error.hpp"
 #include "roslam/sources/depth_noise.hpp"
 #include "roslam/sources/simulated_source.hpp"
+#include "tests/scratch.hpp"
 
 namespace roslam {
 namespace {
@@ -290,7 +291,7 @@ TEST(SimulatorOptions, NamesTheFieldOutOfItsRange) {
 
 class SimulateCommand : public testing::Test {
  protected:
-  SimulateCommand() : out_(fs::path(testing::TempDir()) / "roslam_simulate_test") { fs::remove_all(out_); }
+  SimulateCommand() : out_(scratch_path()) { fs::remove_all(out_); }
   ~SimulateCommand() override { fs::remove_all(out_); }
 
   static int run(const std::string& arguments) {

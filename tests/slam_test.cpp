@@ -14,8 +14,8 @@ namespace roslam {
 namespace {
 
 struct Flight {
-  double ate = 0.0;          // metres, RMSE
-  double path = 0.0;         // metres
+  double ate = 0.0;   // metres, RMSE
+  double path = 0.0;  // metres
   std::size_t frames = 0;
   std::size_t tracked = 0;
 };
@@ -102,7 +102,8 @@ TEST(Slam, RealTimeModeAccountsForEveryFrame) {
   const RunSummary summary = run(source, slam);
   EXPECT_EQ(slam.frames() + summary.dropped, 40U);
   EXPECT_EQ(slam.trajectory().size(), slam.frames());
-  EXPECT_GT(summary.wall_seconds, 39.0 / 30.0 - 0.01) << "frames must not come earlier than their timestamps say";
+  EXPECT_GT(summary.wall_seconds, 39.0 / 30.0 - 0.01)
+      << "frames must not come earlier than their timestamps say";
   EXPECT_LT(evaluate_trajectory(summary.truth, slam.trajectory()).ate.rmse, 0.05);
 }
 
@@ -152,7 +153,8 @@ TEST(Slam, UsesNothingUnderTheMask) {
   mask.colRange(0, 320) = 255;
   ASSERT_TRUE(slam.process(frame, mask)->is_keyframe);
   ASSERT_GT(slam.map().landmark_count(), 100U);
-  for (const Eigen::Vector2f& pixel : slam.map().find(KeyframeId{0})->view->pixels) EXPECT_GT(pixel.x(), 320.0F);
+  for (const Eigen::Vector2f& pixel : slam.map().find(KeyframeId{0})->view->pixels)
+    EXPECT_GT(pixel.x(), 320.0F);
 }
 
 }  // namespace

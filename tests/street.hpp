@@ -18,6 +18,7 @@
 
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/sources/tum_source.hpp"
+#include "tests/scratch.hpp"
 
 /// Tests on a short flight along the simulated street without traffic. The program record_street renders it
 /// once for all of them (a CTest fixture), since that takes longer than the tests themselves: frames 0 to 59
@@ -147,10 +148,7 @@ class Dataset : public testing::Test {
   nlohmann::json report() const { return nlohmann::json::parse(content(run_ / "run.json"), nullptr, false); }
   Trajectory trajectory() const { return read_trajectory(run_ / "trajectory.txt").trajectory; }
 
-  const fs::path scratch_ =
-      fs::path(testing::TempDir()) /
-      (std::string("roslam_") + testing::UnitTest::GetInstance()->current_test_info()->test_suite_name() +
-       "_" + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const fs::path scratch_ = scratch_path();
   const fs::path data_ = scratch_ / "data";
   const fs::path run_ = scratch_ / "run";
   std::vector<Line> colour_;

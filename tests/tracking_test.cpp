@@ -67,9 +67,10 @@ class PoseOptimiser : public testing::Test {
         pixel += Eigen::Vector2d(60.0 + 100.0 * uniform(generator_), 90.0 * uniform(generator_));
         depth += 0.8;
       }
-      measurements.push_back({truth_.inverse() * in_camera,
-                              Measurement::make(pixel.cast<float>(), with_depth ? static_cast<float>(depth) : 0.0F,
-                                                1.0F, noise_)});
+      measurements.push_back(
+          {truth_.inverse() * in_camera,
+           Measurement::make(pixel.cast<float>(), with_depth ? static_cast<float>(depth) : 0.0F, 1.0F,
+                             noise_)});
     }
     return measurements;
   }
@@ -125,7 +126,8 @@ TEST_F(PoseOptimiser, PointsBehindTheCameraAreOutliers) {
   auto measurements = measure(50, 0.0, 0.0, true);
   for (std::size_t i = 0; i < 10; ++i) {
     const Eigen::Vector3d in_camera = truth_ * measurements[i].point_world;
-    measurements[i].point_world = truth_.inverse() * Eigen::Vector3d(in_camera.x(), in_camera.y(), -in_camera.z());
+    measurements[i].point_world =
+        truth_.inverse() * Eigen::Vector3d(in_camera.x(), in_camera.y(), -in_camera.z());
   }
   const auto pose = optimise_pose(camera_, measurements, disturbed());
   for (std::size_t i = 0; i < 10; ++i) EXPECT_FALSE(pose.is_inlier[i]);

@@ -12,6 +12,7 @@
 
 #include "roslam/error.hpp"
 #include "roslam/geometry/alignment.hpp"
+#include "tests/scratch.hpp"
 
 namespace roslam {
 namespace {
@@ -26,10 +27,7 @@ std::string content(const fs::path& file) {
 
 class TrajectoryText : public testing::Test {
  protected:
-  // CTest runs cases side by side: each has a file of its own.
-  const fs::path file_ =
-      fs::path(testing::TempDir()) /
-      (std::string("trajectory_") + testing::UnitTest::GetInstance()->current_test_info()->name() + ".txt");
+  const fs::path file_ = scratch_path(".txt");
 
   TrajectoryFile read(const std::string& text) const {
     std::ofstream(file_, std::ios::binary) << text;

@@ -9,6 +9,7 @@
 #include "roslam/error.hpp"
 #include "roslam/sources/image_file.hpp"
 #include "roslam/sources/tum_source.hpp"
+#include "tests/scratch.hpp"
 
 namespace roslam {
 namespace {
@@ -84,7 +85,7 @@ class TumFolder : public testing::Test {
     return frames;
   }
 
-  const fs::path folder_ = fs::path(testing::TempDir()) / "roslam_tum_source_test";
+  const fs::path folder_ = scratch_path();
   Camera camera_;
 };
 

@@ -6,8 +6,8 @@
 
 namespace roslam::app {
 
-/// Turns ctrl-C and a termination request into a stop token. Make one before any other thread starts: it keeps the
-/// signals from interrupting them. A second ctrl-C ends the program at once.
+/// Turns ctrl-C and a termination request into a stop token. Make one before any other thread starts: it
+/// keeps the signals from interrupting them. A second ctrl-C ends the program at once.
 class InterruptWatcher {
  public:
   InterruptWatcher();

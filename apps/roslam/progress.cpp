@@ -36,23 +36,25 @@ void Progress::show(std::size_t done, std::string_view state) {
 void Progress::print_bar(std::size_t done, std::string_view state, double elapsed) const {
   const double rate = elapsed > 0.0 ? static_cast<double>(done) / elapsed : 0.0;
   if (!total_) {
-    std::fprintf(stderr, "\r%zu frames  %.1f fps  %-14.*s", done, rate, static_cast<int>(state.size()), state.data());
+    std::fprintf(stderr, "\r%zu frames  %.1f fps  %-14.*s", done, rate, static_cast<int>(state.size()),
+                 state.data());
     return;
   }
-  const double share = std::min(1.0, static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(*total_, 1)));
+  const double share =
+      std::min(1.0, static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(*total_, 1)));
   const auto filled = static_cast<std::size_t>(share * kBarWidth);
   const std::string bar = std::string(filled, '#') + std::string(kBarWidth - filled, '.');
   const double left = rate > 0.0 ? static_cast<double>(*total_ - std::min(done, *total_)) / rate : 0.0;
-  std::fprintf(stderr, "\r[%s] %zu/%zu  %.1f fps  %.0f s left  %-14.*s", bar.c_str(), done, *total_, rate, left,
-               static_cast<int>(state.size()), state.data());
+  std::fprintf(stderr, "\r[%s] %zu/%zu  %.1f fps  %.0f s left  %-14.*s", bar.c_str(), done, *total_, rate,
+               left, static_cast<int>(state.size()), state.data());
 }
 
 void Progress::print_line(std::size_t done, std::string_view state, double elapsed) const {
   const double rate = elapsed > 0.0 ? static_cast<double>(done) / elapsed : 0.0;
   std::string of;
   if (total_) of.append("/").append(std::to_string(*total_));
-  std::fprintf(stderr, "%zu%s frames, %.1f fps, %.*s\n", done, of.c_str(), rate, static_cast<int>(state.size()),
-               state.data());
+  std::fprintf(stderr, "%zu%s frames, %.1f fps, %.*s\n", done, of.c_str(), rate,
+               static_cast<int>(state.size()), state.data());
 }
 
 }  // namespace roslam::app

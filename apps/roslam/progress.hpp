@@ -8,7 +8,8 @@
 
 namespace roslam::app {
 
-/// Shows how far a long work has come on stderr: a bar on a terminal, a plain line every few seconds elsewhere.
+/// Shows how far a long work has come on stderr: a bar on a terminal, a plain line every few seconds
+/// elsewhere.
 class Progress {
  public:
   /// total: number of steps, if known.

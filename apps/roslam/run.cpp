@@ -37,7 +37,8 @@ std::string in_words(const std::map<std::string, std::size_t>& counts) {
 }
 
 // A run without a single pose is no success, whatever was written.
-void require_poses(const Slam& slam, const RunSummary& summary, const FrameSource& source, const std::string& name) {
+void require_poses(const Slam& slam, const RunSummary& summary, const FrameSource& source,
+                   const std::string& name) {
   if (summary.interrupted || !slam.trajectory().empty()) return;
   const std::string skipped = in_words(source.skipped()) + in_words(slam.rejected());
   if (slam.frames() == 0) {
@@ -56,10 +57,12 @@ void require_poses(const Slam& slam, const RunSummary& summary, const FrameSourc
 void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder& folder) {
   const auto times = slam.times().summary();
   const std::size_t tracked = slam.trajectory().size();
-  std::printf("tracked %zu of %zu frames (%.1f %%), %zu dropped%s\n", tracked, slam.frames(),
-              100.0 * static_cast<double>(tracked) / static_cast<double>(std::max<std::size_t>(slam.frames(), 1)),
-              summary.dropped, summary.interrupted ? ", interrupted" : "");
-  std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(), slam.map().landmark_count());
+  std::printf(
+      "tracked %zu of %zu frames (%.1f %%), %zu dropped%s\n", tracked, slam.frames(),
+      100.0 * static_cast<double>(tracked) / static_cast<double>(std::max<std::size_t>(slam.frames(), 1)),
+      summary.dropped, summary.interrupted ? ", interrupted" : "");
+  std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
+              slam.map().landmark_count());
   if (const auto found = times.find("tracking"); found != times.end()) {
     std::printf("tracking: median %.1f ms, p95 %.1f ms of processor time a frame\n", found->second.median_ms,
                 found->second.p95_ms);
@@ -90,7 +93,8 @@ void execute(const RunArguments& arguments, const std::string& version) {
   {
     Progress progress(source->size(), arguments.quiet || arguments.json);
     summary = run(
-        *source, slam, [&](const FrameResult& frame) { progress.show(frame.index + 1, name_of(frame.state)); },
+        *source, slam,
+        [&](const FrameResult& frame) { progress.show(frame.index + 1, name_of(frame.state)); },
         interrupt.token());
   }
   const RunDescription description{arguments.source.name, arguments.source.camera, version};
@@ -108,26 +112,31 @@ void execute(const RunArguments& arguments, const std::string& version) {
 
 void add_run_command(CLI::App& program, const std::string& version) {
   const auto arguments = std::make_shared<RunArguments>();
-  CLI::App* command = program.add_subcommand("run", "Track a recorded or simulated flight and map what it sees");
+  CLI::App* command =
+      program.add_subcommand("run", "Track a recorded or simulated flight and map what it sees");
   command->footer(
       "Examples:\n"
       "  roslam run simulated:street --out street\n"
       "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n"
       "  roslam run my_flight --camera my_camera.yaml --real-time --out live\n"
       "RUN then holds trajectory.txt and keyframes.txt (TUM format), map.ply, trajectory.png and run.json.\n"
-      "Ctrl-C ends the run early and writes what was computed so far (exit code 0, \"interrupted\" in run.json).");
+      "Ctrl-C ends the run early and writes what was computed so far (exit code 0, \"interrupted\" in "
+      "run.json).");
   command->add_option("SOURCE", arguments->source.name,
                       "A folder in TUM RGB-D format, or simulated:street, simulated:loop, simulated:hover, "
                       "simulated:turn");
   command->add_option("--camera", arguments->source.camera,
                       "A preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file");
-  command->add_option("--out", arguments->out, "Folder the results are written to; made if it does not exist");
+  command->add_option("--out", arguments->out,
+                      "Folder the results are written to; made if it does not exist");
   command->add_option("--config", arguments->config, "YAML file with options; --print-config shows them all");
-  auto* deterministic = command->add_flag("--deterministic", arguments->deterministic,
-                                          "One stage after the other: the same input gives the same bytes (default)");
+  auto* deterministic =
+      command->add_flag("--deterministic", arguments->deterministic,
+                        "One stage after the other: the same input gives the same bytes (default)");
   command
-      ->add_flag("--real-time", arguments->real_time,
-                 "Stages on threads, frames at the pace of their timestamps; late frames are dropped and counted")
+      ->add_flag(
+          "--real-time", arguments->real_time,
+          "Stages on threads, frames at the pace of their timestamps; late frames are dropped and counted")
       ->excludes(deterministic);
   command->add_option("--traffic", arguments->source.traffic, "Of a simulated flight: none, light or heavy")
       ->check(CLI::IsMember({"none", "light", "heavy"}))

@@ -15,10 +15,12 @@ constexpr std::string_view kSimulated = "simulated:";
 std::unique_ptr<FrameSource> open_simulation(const SourceArguments& arguments) {
   const auto path = flight_path_from(arguments.name.substr(kSimulated.size()));
   const auto traffic = traffic_level_from(arguments.traffic);
-  if (!path) throw InputError(arguments.name + ": no such flight; use simulated:street, :loop, :hover or :turn");
+  if (!path)
+    throw InputError(arguments.name + ": no such flight; use simulated:street, :loop, :hover or :turn");
   if (!traffic) throw InputError("--traffic " + arguments.traffic + ": use none, light or heavy");
   if (!arguments.camera.empty() && arguments.camera != "simulated") {
-    throw InputError("--camera " + arguments.camera + ": a simulated flight brings its own camera; leave it out");
+    throw InputError("--camera " + arguments.camera +
+                     ": a simulated flight brings its own camera; leave it out");
   }
   SimulatorOptions options;
   options.path = *path;

@@ -17,8 +17,8 @@ namespace roslam {
 namespace {
 // Always inlined, so that it is compiled for the instruction set of each clone it is used in.
 [[gnu::always_inline]] inline int distance(const Descriptor& a, const Descriptor& b) {
-  return __builtin_popcountll(a[0] ^ b[0]) + __builtin_popcountll(a[1] ^ b[1]) + __builtin_popcountll(a[2] ^ b[2]) +
-         __builtin_popcountll(a[3] ^ b[3]);
+  return __builtin_popcountll(a[0] ^ b[0]) + __builtin_popcountll(a[1] ^ b[1]) +
+         __builtin_popcountll(a[2] ^ b[2]) + __builtin_popcountll(a[3] ^ b[3]);
 }
 
 [[gnu::always_inline]] inline void offer(NearestTwo& nearest, int index, int candidate_distance) {

@@ -18,8 +18,8 @@ int hamming(const Descriptor& a, const Descriptor& b);
 
 /// The nearest and the second nearest of a set of descriptors.
 struct NearestTwo {
-  int best = -1;               ///< index into the pool, -1 = no candidate
-  int second = -1;             ///< index into the pool, -1 = fewer than two candidates
+  int best = -1;    ///< index into the pool, -1 = no candidate
+  int second = -1;  ///< index into the pool, -1 = fewer than two candidates
   int best_distance = kDescriptorBits + 1;
   int second_distance = kDescriptorBits + 1;
 };

@@ -36,7 +36,8 @@ int FeatureGrid::row(float y) const {
   return static_cast<int>(std::clamp((y - min_.y()) * cells_per_pixel_.y(), 0.0F, kRows - 1.0F));
 }
 
-void FeatureGrid::find(const Eigen::Vector2f& centre, float radius, std::vector<std::uint32_t>& result) const {
+void FeatureGrid::find(const Eigen::Vector2f& centre, float radius,
+                       std::vector<std::uint32_t>& result) const {
   if (points_.empty()) return;
   const int first_column = column(centre.x() - radius);
   const int last_column = column(centre.x() + radius);

@@ -33,9 +33,9 @@ class FeatureGrid {
   Eigen::Vector2f min_ = Eigen::Vector2f::Zero();
   Eigen::Vector2f max_ = Eigen::Vector2f::Zero();
   Eigen::Vector2f cells_per_pixel_ = Eigen::Vector2f::Zero();
-  std::vector<Eigen::Vector2f> points_;      // in the order of cells
-  std::vector<std::uint32_t> indices_;       // original index of each entry of points_
-  std::vector<std::uint32_t> cell_begin_;    // kColumns * kRows + 1 offsets into points_
+  std::vector<Eigen::Vector2f> points_;    // in the order of cells
+  std::vector<std::uint32_t> indices_;     // original index of each entry of points_
+  std::vector<std::uint32_t> cell_begin_;  // kColumns * kRows + 1 offsets into points_
 };
 
 }  // namespace roslam

@@ -36,7 +36,8 @@ void DepthOptions::validate() const {
   if (!(max_depth > min_depth && std::isfinite(max_depth))) {
     throw OptionsError("depth.max_depth must be above min_depth (metres)");
   }
-  if (!(edge_ratio > 0.0 && edge_ratio <= 1.0)) throw OptionsError("depth.edge_ratio must be above 0 and at most 1");
+  if (!(edge_ratio > 0.0 && edge_ratio <= 1.0))
+    throw OptionsError("depth.edge_ratio must be above 0 and at most 1");
 }
 
 ObservedFrame observe(std::span<const OrbFeature> features, const cv::Mat& colour, const cv::Mat& depth,

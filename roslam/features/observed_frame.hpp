@@ -14,25 +14,25 @@
 
 namespace roslam {
 
-/// What tracking and mapping know of one picture: its points, without the picture. All arrays have one entry a
-/// point and are ordered by pyramid level.
+/// What tracking and mapping know of one picture: its points, without the picture. All arrays have one entry
+/// a point and are ordered by pyramid level.
 struct ObservedFrame {
-  std::vector<Eigen::Vector2f> pixels;      ///< lens distortion removed
-  std::vector<float> depths;                ///< metres along the optical axis, 0 = unknown
-  std::vector<std::uint8_t> levels;         ///< pyramid level
-  std::vector<float> angles;                ///< degrees
-  std::vector<cv::Vec3b> colours;           ///< BGR
+  std::vector<Eigen::Vector2f> pixels;  ///< lens distortion removed
+  std::vector<float> depths;            ///< metres along the optical axis, 0 = unknown
+  std::vector<std::uint8_t> levels;     ///< pyramid level
+  std::vector<float> angles;            ///< degrees
+  std::vector<cv::Vec3b> colours;       ///< BGR
   std::vector<Descriptor> descriptors;
-  FeatureGrid grid;                         ///< over pixels
+  FeatureGrid grid;  ///< over pixels
 
   std::size_t size() const { return pixels.size(); }
 };
 
 /// Depth limits of what is believed.
 struct DepthOptions {
-  double min_depth = 0.1;         ///< metres, nearer readings are unknown
-  double max_depth = 20.0;        ///< metres, farther readings are unknown
-  double edge_ratio = 0.05;       ///< depth is unknown where its neighbours differ by more than this share of it
+  double min_depth = 0.1;    ///< metres, nearer readings are unknown
+  double max_depth = 20.0;   ///< metres, farther readings are unknown
+  double edge_ratio = 0.05;  ///< depth is unknown where its neighbours differ by more than this share of it
 
   /// Throws OptionsError naming the field.
   void validate() const;

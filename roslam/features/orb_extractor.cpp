@@ -52,7 +52,8 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint>& points, const cv::Si
   return points;
 }
 
-// Direction from the centre of a round patch to its intensity centroid, in degrees (Rublee et al. 2011, eq. 3).
+// Direction from the centre of a round patch to its intensity centroid, in degrees (Rublee et al. 2011, eq.
+// 3).
 float orientation(const cv::Mat& image, const cv::Point& centre, const std::vector<int>& circle) {
   int moment_x = 0;
   int moment_y = 0;
@@ -97,8 +98,9 @@ OrbExtractor::OrbExtractor(const OrbOptions& options) : options_(options) {
   for (int y = 0; y <= kPatchRadius; ++y) {
     circle_.push_back(static_cast<int>(std::sqrt(kPatchRadius * kPatchRadius - y * y + 0.5)));
   }
-  describer_ = cv::ORB::create(options_.features, static_cast<float>(options_.scale_factor), options_.levels, kBorder,
-                               0, 2, cv::ORB::FAST_SCORE, 2 * kPatchRadius + 1, options_.fast_threshold);
+  describer_ =
+      cv::ORB::create(options_.features, static_cast<float>(options_.scale_factor), options_.levels, kBorder,
+                      0, 2, cv::ORB::FAST_SCORE, 2 * kPatchRadius + 1, options_.fast_threshold);
 }
 
 std::vector<cv::KeyPoint> OrbExtractor::corners(const cv::Mat& level_image) const {
@@ -111,7 +113,8 @@ std::vector<cv::KeyPoint> OrbExtractor::corners(const cv::Mat& level_image) cons
   const int rows = std::max(1, height / options_.cell_size);
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < columns; ++c) {
-      const cv::Point begin(kBorder + width * c / columns - kFastRadius, kBorder + height * r / rows - kFastRadius);
+      const cv::Point begin(kBorder + width * c / columns - kFastRadius,
+                            kBorder + height * r / rows - kFastRadius);
       const cv::Point end(kBorder + width * (c + 1) / columns + kFastRadius,
                           kBorder + height * (r + 1) / rows + kFastRadius);
       const cv::Mat cell = level_image(cv::Rect(begin, end));
@@ -126,7 +129,8 @@ std::vector<cv::KeyPoint> OrbExtractor::corners(const cv::Mat& level_image) cons
   return found;
 }
 
-std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyramid, const cv::Mat& mask) const {
+std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyramid,
+                                               const cv::Mat& mask) const {
   std::vector<cv::KeyPoint> all;
   int surplus = 0;  // what coarser or finer levels could not fill is passed on
   for (std::size_t level = 0; level < pyramid.size(); ++level) {

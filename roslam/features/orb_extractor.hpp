@@ -10,13 +10,13 @@
 namespace roslam {
 
 struct OrbOptions {
-  int features = 1000;           ///< points wanted in an image
-  int levels = 8;                ///< pyramid levels
-  double scale_factor = 1.2;     ///< size ratio between levels
-  int fast_threshold = 20;       ///< grey levels a corner must stand out by
-  int min_fast_threshold = 7;    ///< grey levels, tried where a cell has no corner at fast_threshold
-  int cell_size = 64;            ///< pixels, side of the cells the threshold adapts in
-  int mask_margin = 4;           ///< pixels around masked pixels that give no point either
+  int features = 1000;         ///< points wanted in an image
+  int levels = 8;              ///< pyramid levels
+  double scale_factor = 1.2;   ///< size ratio between levels
+  int fast_threshold = 20;     ///< grey levels a corner must stand out by
+  int min_fast_threshold = 7;  ///< grey levels, tried where a cell has no corner at fast_threshold
+  int cell_size = 64;          ///< pixels, side of the cells the threshold adapts in
+  int mask_margin = 4;         ///< pixels around masked pixels that give no point either
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -24,15 +24,16 @@ struct OrbOptions {
 
 /// A point with its descriptor.
 struct OrbFeature {
-  cv::Point2f pixel;     ///< in the full-size image as taken
-  int level = 0;         ///< pyramid level it was found on
-  float angle = 0.0F;    ///< degrees, orientation of the patch
+  cv::Point2f pixel;   ///< in the full-size image as taken
+  int level = 0;       ///< pyramid level it was found on
+  float angle = 0.0F;  ///< degrees, orientation of the patch
   Descriptor descriptor{};
 };
 
-/// Extracts ORB features (Rublee et al. 2011): FAST corners on an image pyramid, oriented by the intensity centroid
-/// and described by rotated BRIEF. Points are spread evenly over levels and over the image: each level has a share
-/// of the budget by its side length, and within a level a grid of as many cells as points wanted is served in turns.
+/// Extracts ORB features (Rublee et al. 2011): FAST corners on an image pyramid, oriented by the intensity
+/// centroid and described by rotated BRIEF. Points are spread evenly over levels and over the image: each
+/// level has a share of the budget by its side length, and within a level a grid of as many cells as points
+/// wanted is served in turns.
 class OrbExtractor {
  public:
   /// Throws OptionsError.
@@ -54,8 +55,8 @@ class OrbExtractor {
 
   OrbOptions options_;
   std::vector<float> scales_;
-  std::vector<int> quotas_;          // points wanted at each level
-  std::vector<int> circle_;          // half width of the orientation patch, row by row
+  std::vector<int> quotas_;  // points wanted at each level
+  std::vector<int> circle_;  // half width of the orientation patch, row by row
   cv::Ptr<cv::ORB> describer_;
 };
 

@@ -36,7 +36,8 @@ bool positive(double value) { return std::isfinite(value) && value > 0.0; }
 
 void Camera::validate() const {
   const std::string got = "; check the camera file or use a preset";
-  require(width >= 32 && width <= 16384, "width must be 32 to 16384 pixels, got " + std::to_string(width) + got);
+  require(width >= 32 && width <= 16384,
+          "width must be 32 to 16384 pixels, got " + std::to_string(width) + got);
   require(height >= 32 && height <= 16384,
           "height must be 32 to 16384 pixels, got " + std::to_string(height) + got);
   require(positive(fx), "fx must be positive, got " + std::to_string(fx) + got);
@@ -46,7 +47,8 @@ void Camera::validate() const {
   require(std::isfinite(cx) && cx > -width && cx < 2 * width, "cx lies far outside the image" + got);
   require(std::isfinite(cy) && cy > -height && cy < 2 * height, "cy lies far outside the image" + got);
   for (const double k : distortion) {
-    require(std::isfinite(k) && std::abs(k) < 1000.0, "distortion must be five finite numbers k1 k2 p1 p2 k3" + got);
+    require(std::isfinite(k) && std::abs(k) < 1000.0,
+            "distortion must be five finite numbers k1 k2 p1 p2 k3" + got);
   }
   require(is_invertible(*this), "distortion bends the image so much that it cannot be undone" + got);
   require(positive(depth_units_per_metre),
@@ -79,8 +81,10 @@ Eigen::Vector2d Camera::undistort(const Eigen::Vector2d& pixel) const {
     const Eigen::Vector2d residual = distort(estimate) - pixel;
     if (residual.squaredNorm() < 1e-14) break;
     Eigen::Matrix2d jacobian;
-    jacobian.col(0) = (distort(estimate + Eigen::Vector2d(kStep, 0)) - distort(estimate - Eigen::Vector2d(kStep, 0)));
-    jacobian.col(1) = (distort(estimate + Eigen::Vector2d(0, kStep)) - distort(estimate - Eigen::Vector2d(0, kStep)));
+    jacobian.col(0) =
+        (distort(estimate + Eigen::Vector2d(kStep, 0)) - distort(estimate - Eigen::Vector2d(kStep, 0)));
+    jacobian.col(1) =
+        (distort(estimate + Eigen::Vector2d(0, kStep)) - distort(estimate - Eigen::Vector2d(0, kStep)));
     jacobian /= 2.0 * kStep;
     if (std::abs(jacobian.determinant()) < 1e-9) break;
     estimate -= jacobian.inverse() * residual;

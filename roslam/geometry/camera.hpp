@@ -14,15 +14,15 @@ namespace roslam {
 /// A pinhole camera with Brown-Conrady lens distortion. Pixels: x right, y down, the centre of the top left
 /// pixel at (0, 0). Camera frame: z forward, x right, y down, metres.
 struct Camera {
-  int width = 640;                                   ///< pixels
-  int height = 480;                                  ///< pixels
-  double fx = 525.0;                                 ///< pixels
-  double fy = 525.0;                                 ///< pixels
-  double cx = 319.5;                                 ///< pixels
-  double cy = 239.5;                                 ///< pixels
-  std::array<double, 5> distortion{0, 0, 0, 0, 0};   ///< k1, k2, p1, p2, k3
-  double depth_units_per_metre = 5000.0;             ///< value of a 16-bit depth image at one metre
-  double fps = 30.0;                                 ///< frames a second
+  int width = 640;                                  ///< pixels
+  int height = 480;                                 ///< pixels
+  double fx = 525.0;                                ///< pixels
+  double fy = 525.0;                                ///< pixels
+  double cx = 319.5;                                ///< pixels
+  double cy = 239.5;                                ///< pixels
+  std::array<double, 5> distortion{0, 0, 0, 0, 0};  ///< k1, k2, p1, p2, k3
+  double depth_units_per_metre = 5000.0;            ///< value of a 16-bit depth image at one metre
+  double fps = 30.0;                                ///< frames a second
 
   /// Throws CalibrationError naming the field that no real camera can have.
   void validate() const;

@@ -11,9 +11,8 @@ namespace roslam {
 
 namespace {
 std::map<std::string, Camera, std::less<>> presets() {
-  const auto make = [](double fx, double fy, double cx, double cy, std::array<double, 5> distortion, double units) {
-    return Camera{640, 480, fx, fy, cx, cy, distortion, units, 30.0};
-  };
+  const auto make = [](double fx, double fy, double cx, double cy, std::array<double, 5> distortion,
+                       double units) { return Camera{640, 480, fx, fy, cx, cy, distortion, units, 30.0}; };
   // TUM: calibration published with the RGB-D benchmark. RealSense: typical factory values of the colour
   // stream at 640x480 with depth aligned to colour; calibrate your own camera for the best accuracy.
   return {
@@ -58,15 +57,16 @@ class CameraFile {
 };
 
 void reject_unknown_keys(const std::filesystem::path& path, const YAML::Node& node) {
-  const std::set<std::string> known{"model", "width", "height",     "fx",
-                                    "fy",    "cx",    "cy",         "distortion",
-                                    "fps",   "depth_units_per_metre"};
+  const std::set<std::string> known{"model", "width", "height",     "fx",  "fy",
+                                    "cx",    "cy",    "distortion", "fps", "depth_units_per_metre"};
   std::set<std::string> seen;
   for (const auto& entry : node) {
-    if (!entry.first.IsScalar()) throw InputError(path.string() + ": a key must be a word; write 'key: value' lines");
+    if (!entry.first.IsScalar())
+      throw InputError(path.string() + ": a key must be a word; write 'key: value' lines");
     const std::string& key = entry.first.Scalar();
     // YAML readers take one of two equal keys without a word.
-    if (!seen.insert(key).second) throw InputError(path.string() + ": '" + key + "' is given twice; remove one");
+    if (!seen.insert(key).second)
+      throw InputError(path.string() + ": '" + key + "' is given twice; remove one");
     if (!known.contains(key)) {
       throw InputError(path.string() + ": unknown key '" + key + "'; known: model width height fx fy cx cy " +
                        "distortion depth_units_per_metre fps");
@@ -111,7 +111,8 @@ Camera read_camera(const std::filesystem::path& file) {
   camera.cx = read.get<double>("cx");
   camera.cy = read.get<double>("cy");
   const auto coefficients = read.get<std::vector<double>>("distortion", {});
-  if (coefficients.size() > 5) throw InputError(file.string() + ": distortion has more than 5 values k1 k2 p1 p2 k3");
+  if (coefficients.size() > 5)
+    throw InputError(file.string() + ": distortion has more than 5 values k1 k2 p1 p2 k3");
   std::copy(coefficients.begin(), coefficients.end(), camera.distortion.begin());
   camera.depth_units_per_metre = read.get<double>("depth_units_per_metre", camera.depth_units_per_metre);
   camera.fps = read.get<double>("fps", camera.fps);

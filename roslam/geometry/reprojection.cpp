@@ -8,15 +8,19 @@
 namespace roslam {
 
 void MeasurementNoise::validate() const {
-  if (!(pixel_sigma > 0.0 && pixel_sigma < 100.0)) throw OptionsError("noise.pixel_sigma must be 0 to 100 pixels");
-  if (!(depth_sigma > 0.0 && depth_sigma < 10.0)) throw OptionsError("noise.depth_sigma must be 0 to 10 metres");
-  if (!(outlier_factor >= 1.0 && outlier_factor <= 100.0)) throw OptionsError("noise.outlier_factor must be 1 to 100");
+  if (!(pixel_sigma > 0.0 && pixel_sigma < 100.0))
+    throw OptionsError("noise.pixel_sigma must be 0 to 100 pixels");
+  if (!(depth_sigma > 0.0 && depth_sigma < 10.0))
+    throw OptionsError("noise.depth_sigma must be 0 to 10 metres");
+  if (!(outlier_factor >= 1.0 && outlier_factor <= 100.0))
+    throw OptionsError("noise.outlier_factor must be 1 to 100");
   if (!(depth_sigma_growth >= 0.0 && depth_sigma_growth < 10.0)) {
     throw OptionsError("noise.depth_sigma_growth must be 0 to 10 (1/metre)");
   }
 }
 
-Measurement Measurement::make(const Eigen::Vector2f& pixel, float depth, float scale, const MeasurementNoise& noise) {
+Measurement Measurement::make(const Eigen::Vector2f& pixel, float depth, float scale,
+                              const MeasurementNoise& noise) {
   Measurement m;
   m.pixel = pixel.cast<double>();
   m.depth = depth;

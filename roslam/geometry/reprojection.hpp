@@ -10,13 +10,14 @@ namespace roslam {
 
 /// How far measured points are trusted.
 struct MeasurementNoise {
-  double pixel_sigma = 1.5;          ///< pixels at the finest pyramid level; grows with the level's scale
-  double depth_sigma = 0.005;         ///< metres, the part that does not depend on distance
-  double depth_sigma_growth = 0.004;  ///< 1/metre: depth noise grows with the square of the distance (Khoshelham 2012)
+  double pixel_sigma = 1.5;    ///< pixels at the finest pyramid level; grows with the level's scale
+  double depth_sigma = 0.005;  ///< metres, the part that does not depend on distance
+  double depth_sigma_growth =
+      0.004;  ///< 1/metre: depth noise grows with the square of the distance (Khoshelham 2012)
 
-  /// What fits worse than the chi-squared limit weighs less; what fits worse than so many times the limit is wrong.
-  /// Dropping measurements at the limit itself would keep landmarks where they are instead of letting bundle
-  /// adjustment move them.
+  /// What fits worse than the chi-squared limit weighs less; what fits worse than so many times the limit is
+  /// wrong. Dropping measurements at the limit itself would keep landmarks where they are instead of letting
+  /// bundle adjustment move them.
   double outlier_factor = 4.0;
 
   double sigma_of_depth(double depth) const { return depth_sigma + depth_sigma_growth * depth * depth; }
@@ -33,11 +34,13 @@ struct Measurement {
   double depth_weight = 0.0;                        ///< 1 / sigma, 1/metre; 0 = no depth
   double outlier_factor = 1.0;                      ///< times the chi-squared limit that make an outlier
 
-  static Measurement make(const Eigen::Vector2f& pixel, float depth, float scale, const MeasurementNoise& noise);
+  static Measurement make(const Eigen::Vector2f& pixel, float depth, float scale,
+                          const MeasurementNoise& noise);
   bool has_depth() const { return depth_weight > 0.0; }
 };
 
-/// 95 % limits of the squared error of measurements without and with depth (chi-squared, 2 and 3 degrees of freedom).
+/// 95 % limits of the squared error of measurements without and with depth (chi-squared, 2 and 3 degrees of
+/// freedom).
 constexpr double kChiSquared2 = 5.991;
 constexpr double kChiSquared3 = 7.815;
 inline double chi_squared_limit(const Measurement& m) { return m.has_depth() ? kChiSquared3 : kChiSquared2; }
@@ -45,8 +48,8 @@ inline double chi_squared_limit(const Measurement& m) { return m.has_depth() ? k
 /// Squared error above which a measurement is an outlier rather than a bad fit (see MeasurementNoise).
 inline double outlier_limit(const Measurement& m) { return m.outlier_factor * chi_squared_limit(m); }
 
-/// The error of a measurement: (pixel x, pixel y, depth), each divided by its sigma; the depth row is 0 where depth
-/// is unknown. All of it refers to the point's coordinates in the camera frame (z > 0).
+/// The error of a measurement: (pixel x, pixel y, depth), each divided by its sigma; the depth row is 0 where
+/// depth is unknown. All of it refers to the point's coordinates in the camera frame (z > 0).
 struct ReprojectionError {
   const Camera& camera;
   const Measurement& measurement;

@@ -5,8 +5,8 @@
 
 namespace roslam {
 
-/// Measures the processor time the calling thread spends. It tells what a stage costs, whatever else the machine
-/// is doing.
+/// Measures the processor time the calling thread spends. It tells what a stage costs, whatever else the
+/// machine is doing.
 class Stopwatch {
  public:
   Stopwatch() : start_(now()) {}

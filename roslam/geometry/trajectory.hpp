@@ -19,16 +19,17 @@ using Trajectory = std::vector<StampedPose>;
 
 /// What read_trajectory found.
 struct TrajectoryFile {
-  Trajectory trajectory;        ///< sorted by time; quaternions normalised
-  std::size_t skipped = 0;      ///< lines left out: NaN, quaternion far from unit length, repeated time
+  Trajectory trajectory;    ///< sorted by time; quaternions normalised
+  std::size_t skipped = 0;  ///< lines left out: NaN, quaternion far from unit length, repeated time
 };
 
 /// Reads a TUM trajectory: lines of "timestamp tx ty tz qx qy qz qw", # starts a comment.
-/// Throws InputError naming file and line for a missing file, a line that is not eight numbers, or no pose at all.
+/// Throws InputError naming file and line for a missing file, a line that is not eight numbers, or no pose at
+/// all.
 TrajectoryFile read_trajectory(const std::filesystem::path& file);
 
-/// Writes a TUM trajectory, one pose a line: six decimals for the time, nine for the pose, the same bytes for the
-/// same poses. Throws OutputError if the file cannot be written in full.
+/// Writes a TUM trajectory, one pose a line: six decimals for the time, nine for the pose, the same bytes for
+/// the same poses. Throws OutputError if the file cannot be written in full.
 void write_trajectory(const std::filesystem::path& file, const Trajectory& trajectory);
 
 }  // namespace roslam

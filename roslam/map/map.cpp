@@ -16,8 +16,8 @@ KeyframeId Map::add_keyframe(std::size_t frame_index, double timestamp, const SE
                              std::shared_ptr<const ObservedFrame> view) {
   const KeyframeId id{static_cast<std::uint32_t>(keyframes_.size())};
   const std::size_t points = view->size();
-  keyframes_.push_back(std::make_unique<Keyframe>(
-      Keyframe{id, frame_index, timestamp, T_camera_world, std::move(view), std::vector<LandmarkId>(points)}));
+  keyframes_.push_back(std::make_unique<Keyframe>(Keyframe{
+      id, frame_index, timestamp, T_camera_world, std::move(view), std::vector<LandmarkId>(points)}));
   anchors_.emplace_back();
   ++keyframe_count_;
   return id;
@@ -182,7 +182,8 @@ std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId id, int min_sh
   for (std::uint32_t i = 0; i < shared.size(); ++i) {
     if (shared[i] >= std::max(1, min_shared)) result.emplace_back(KeyframeId{i}, shared[i]);
   }
-  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::stable_sort(result.begin(), result.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
   return result;
 }
 

@@ -17,8 +17,8 @@ namespace roslam {
 /// A frame kept in the map.
 struct Keyframe {
   KeyframeId id;
-  std::size_t frame_index = 0;                ///< index of the frame in its source
-  double timestamp = 0.0;                     ///< seconds
+  std::size_t frame_index = 0;  ///< index of the frame in its source
+  double timestamp = 0.0;       ///< seconds
   SE3 T_camera_world;
   std::shared_ptr<const ObservedFrame> view;  ///< its points
   std::vector<LandmarkId> landmarks;          ///< landmark each point of the view shows, or none
@@ -34,23 +34,24 @@ struct Observation {
 struct Landmark {
   LandmarkId id;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< world frame, metres
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();    ///< mean unit direction from the landmark to its observers
-  Descriptor descriptor{};                             ///< most typical of its observations
-  float min_distance = 0.0F;                           ///< metres, nearest distance at which it can be recognised
-  float max_distance = 0.0F;                           ///< metres, farthest
-  std::vector<Observation> observations;               ///< in the order of keyframes
+  Eigen::Vector3d normal =
+      Eigen::Vector3d::Zero();            ///< mean unit direction from the landmark to its observers
+  Descriptor descriptor{};                ///< most typical of its observations
+  float min_distance = 0.0F;              ///< metres, nearest distance at which it can be recognised
+  float max_distance = 0.0F;              ///< metres, farthest
+  std::vector<Observation> observations;  ///< in the order of keyframes
   KeyframeId created_by;
   std::uint32_t predicted = 0;  ///< frames that should have seen it
   std::uint32_t found = 0;      ///< frames that did
   cv::Vec3b colour;             ///< BGR
 };
 
-/// Keyframes, landmarks and who sees what. Data only: the algorithms live in tracking and mapping. Not thread safe:
-/// whoever shares a map guards it.
+/// Keyframes, landmarks and who sees what. Data only: the algorithms live in tracking and mapping. Not thread
+/// safe: whoever shares a map guards it.
 class Map {
  public:
-  /// scales: ratio of the full image to each pyramid level, from which the distances a landmark can be recognised
-  /// at follow.
+  /// scales: ratio of the full image to each pyramid level, from which the distances a landmark can be
+  /// recognised at follow.
   explicit Map(std::vector<float> scales) : scales_(std::move(scales)) {}
 
   KeyframeId add_keyframe(std::size_t frame_index, double timestamp, const SE3& T_camera_world,
@@ -59,15 +60,15 @@ class Map {
   /// A new landmark first seen by that point of that keyframe.
   LandmarkId add_landmark(const Eigen::Vector3d& position, KeyframeId keyframe, std::uint32_t point);
 
-  /// Notes that a point of a keyframe shows a landmark. Does nothing and returns false if the point is taken, or if
-  /// the keyframe sees the landmark already.
+  /// Notes that a point of a keyframe shows a landmark. Does nothing and returns false if the point is taken,
+  /// or if the keyframe sees the landmark already.
   bool add_observation(LandmarkId landmark, KeyframeId keyframe, std::uint32_t point);
 
   void remove_observation(LandmarkId landmark, KeyframeId keyframe);
   void remove_landmark(LandmarkId landmark);
 
-  /// Removes a keyframe and its observations. Its pose relative to `anchor` is kept, so that the poses of frames
-  /// that refer to it can still be told.
+  /// Removes a keyframe and its observations. Its pose relative to `anchor` is kept, so that the poses of
+  /// frames that refer to it can still be told.
   void remove_keyframe(KeyframeId keyframe, KeyframeId anchor);
 
   /// Moves all observations of one landmark to another and removes the first.

@@ -46,8 +46,8 @@ void add_terms(const Camera& camera, BundleProblem& problem, std::vector<PosePar
     } else {
       cost = new BundleCost<2>(camera, term.measurement, rotation);  // NOLINT: Ceres takes ownership
     }
-    ceres_problem.AddResidualBlock(cost, term.measurement.has_depth() ? huber3 : huber2, poses[term.pose].data(),
-                                   problem.points[term.point].data());
+    ceres_problem.AddResidualBlock(cost, term.measurement.has_depth() ? huber3 : huber2,
+                                   poses[term.pose].data(), problem.points[term.point].data());
   }
 }
 }  // namespace
@@ -58,7 +58,8 @@ void BundleAdjustmentOptions::validate() const {
   if (min_shared < 1) throw OptionsError("bundle.min_shared must be at least 1");
 }
 
-BundleSummary adjust_bundle(const Camera& camera, BundleProblem& problem, const BundleAdjustmentOptions& options,
+BundleSummary adjust_bundle(const Camera& camera, BundleProblem& problem,
+                            const BundleAdjustmentOptions& options,
                             const std::function<bool()>& should_stop) {
   BundleProblem moved = problem;
   std::vector<PoseParameters> poses(moved.poses.size());
@@ -94,7 +95,8 @@ BundleSummary adjust_bundle(const Camera& camera, BundleProblem& problem, const 
     if (moved.poses[i].is_fixed) continue;
     const Eigen::Map<const Eigen::Vector3d> translation(poses[i].data());
     const Eigen::Map<const Eigen::Vector3d> omega(poses[i].data() + 3);
-    moved.poses[i].T_camera_world = SE3(so3_exp(omega) * moved.poses[i].T_camera_world.rotation(), translation);
+    moved.poses[i].T_camera_world =
+        SE3(so3_exp(omega) * moved.poses[i].T_camera_world.rotation(), translation);
   }
   problem = std::move(moved);
   return {summary.initial_cost, summary.final_cost, static_cast<int>(summary.iterations.size()), true};

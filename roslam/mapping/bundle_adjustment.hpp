@@ -12,9 +12,9 @@
 namespace roslam {
 
 struct BundleAdjustmentOptions {
-  int iterations = 6;          ///< Levenberg-Marquardt steps at most
-  int window = 10;             ///< keyframes that move in local bundle adjustment; others that see the same stay put
-  int min_shared = 15;         ///< landmarks a keyframe must share with the newest one to move with it
+  int iterations = 6;   ///< Levenberg-Marquardt steps at most
+  int window = 10;      ///< keyframes that move in local bundle adjustment; others that see the same stay put
+  int min_shared = 15;  ///< landmarks a keyframe must share with the newest one to move with it
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -43,10 +43,11 @@ struct BundleSummary {
   bool is_usable = false;  ///< false if the solver failed; the problem is unchanged then
 };
 
-/// Moves poses and points so that the sum of robust (Huber) squared errors of all terms becomes least. Solved by
-/// Ceres with analytic derivatives and the sparse Schur complement, on one thread, so that results repeat bit by
-/// bit. should_stop is asked after each step.
-BundleSummary adjust_bundle(const Camera& camera, BundleProblem& problem, const BundleAdjustmentOptions& options,
+/// Moves poses and points so that the sum of robust (Huber) squared errors of all terms becomes least. Solved
+/// by Ceres with analytic derivatives and the sparse Schur complement, on one thread, so that results repeat
+/// bit by bit. should_stop is asked after each step.
+BundleSummary adjust_bundle(const Camera& camera, BundleProblem& problem,
+                            const BundleAdjustmentOptions& options,
                             const std::function<bool()>& should_stop = {});
 
 /// Terms whose squared error is within the chi-squared limit and whose point lies in front of the camera.

@@ -10,9 +10,9 @@
 
 namespace roslam {
 
-/// The error of one measurement as a function of a pose and a point. The pose has six parameters: the translation
-/// of T_camera_world, and a rotation vector omega applied on top of the rotation the problem started with,
-/// R = exp(omega) R_0, so that it stays small and free of singularities.
+/// The error of one measurement as a function of a pose and a point. The pose has six parameters: the
+/// translation of T_camera_world, and a rotation vector omega applied on top of the rotation the problem
+/// started with, R = exp(omega) R_0, so that it stays small and free of singularities.
 template <int kRows>  // 3 with depth, 2 without
 class BundleCost : public ceres::SizedCostFunction<kRows, 6, 3> {
  public:
@@ -32,7 +32,8 @@ class BundleCost : public ceres::SizedCostFunction<kRows, 6, 3> {
     Eigen::Map<Eigen::Matrix<double, kRows, 1>> error(residuals);
     error = term.error(in_camera).template head<kRows>();
     if (jacobians == nullptr) return true;
-    const Eigen::Matrix<double, kRows, 3> by_camera_point = term.jacobian(in_camera).template topRows<kRows>();
+    const Eigen::Matrix<double, kRows, 3> by_camera_point =
+        term.jacobian(in_camera).template topRows<kRows>();
     if (jacobians[0] != nullptr) {
       Eigen::Map<Eigen::Matrix<double, kRows, 6, Eigen::RowMajor>> by_pose(jacobians[0]);
       by_pose.template leftCols<3>() = by_camera_point;

@@ -6,7 +6,8 @@
 namespace roslam {
 
 namespace {
-// True if enough other keyframes see the landmark at the same or a finer pyramid level (one coarser is tolerated).
+// True if enough other keyframes see the landmark at the same or a finer pyramid level (one coarser is
+// tolerated).
 bool is_well_seen(const Map& map, const Landmark& landmark, KeyframeId by, int level, int needed) {
   int views = 0;
   for (const auto& observation : landmark.observations) {
@@ -24,7 +25,8 @@ bool is_redundant(const Map& map, const Keyframe& keyframe, const CullingOptions
     const Landmark* landmark = map.find(keyframe.landmarks[i]);
     if (landmark == nullptr) continue;
     ++landmarks;
-    if (is_well_seen(map, *landmark, keyframe.id, keyframe.view->levels[i], options.redundant_views)) ++well_seen;
+    if (is_well_seen(map, *landmark, keyframe.id, keyframe.view->levels[i], options.redundant_views))
+      ++well_seen;
   }
   return well_seen > options.redundant_share * landmarks;
 }
@@ -69,7 +71,8 @@ int LandmarkCuller::cull(Map& map, KeyframeId newest) {
 int cull_keyframes(Map& map, KeyframeId newest, const CullingOptions& options) {
   int removed = 0;
   for (const auto& [id, shared] : map.covisible(newest)) {
-    const bool is_protected = id.value == 0 || id.value + static_cast<std::uint32_t>(options.keep_newest) > newest.value;
+    const bool is_protected =
+        id.value == 0 || id.value + static_cast<std::uint32_t>(options.keep_newest) > newest.value;
     const Keyframe* keyframe = map.find(id);
     if (is_protected || keyframe == nullptr || !is_redundant(map, *keyframe, options)) continue;
     const auto neighbours = map.covisible(id);

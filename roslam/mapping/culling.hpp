@@ -9,12 +9,12 @@
 namespace roslam {
 
 struct CullingOptions {
-  double min_found_ratio = 0.25;        ///< share of the frames that should have seen a new landmark that must have
-  int probation = 3;                    ///< keyframes a landmark is watched for
-  int min_observations = 3;             ///< keyframes that must see it once its probation ends (2 while it lasts)
-  double redundant_share = 0.9;         ///< share of a keyframe's landmarks others see as well for it to go
-  int redundant_views = 3;              ///< other keyframes that must see each of them
-  int keep_newest = 3;                  ///< newest keyframes that are never removed
+  double min_found_ratio = 0.25;  ///< share of the frames that should have seen a new landmark that must have
+  int probation = 3;              ///< keyframes a landmark is watched for
+  int min_observations = 3;       ///< keyframes that must see it once its probation ends (2 while it lasts)
+  double redundant_share = 0.9;   ///< share of a keyframe's landmarks others see as well for it to go
+  int redundant_views = 3;        ///< other keyframes that must see each of them
+  int keep_newest = 3;            ///< newest keyframes that are never removed
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -35,8 +35,8 @@ class LandmarkCuller {
   std::deque<LandmarkId> watched_;
 };
 
-/// Removes the keyframes around one that add nothing: nearly all their landmarks are seen by enough others at the
-/// same or a finer level. The first keyframe stays. Returns how many were removed.
+/// Removes the keyframes around one that add nothing: nearly all their landmarks are seen by enough others at
+/// the same or a finer level. The first keyframe stays. Returns how many were removed.
 int cull_keyframes(Map& map, KeyframeId newest, const CullingOptions& options);
 
 }  // namespace roslam

@@ -23,7 +23,8 @@ std::vector<KeyframeId> neighbourhood(const Map& map, KeyframeId id, const Fusio
   const std::size_t direct = result.size();
   for (std::size_t i = 0; i < direct && i < 5; ++i) {
     const auto second = map.covisible(result[i]);
-    for (std::size_t k = 0; k < second.size() && k < static_cast<std::size_t>(options.second_neighbours); ++k) {
+    for (std::size_t k = 0; k < second.size() && k < static_cast<std::size_t>(options.second_neighbours);
+         ++k) {
       add(second[k].first);
     }
   }
@@ -73,7 +74,8 @@ class Fuser {
     const Measurement measurement =
         Measurement::make(view.pixels[point], view.depths[point], map_.scale(view.levels[point]), noise_);
     const Eigen::Vector3d in_camera = keyframe.T_camera_world * landmark.position;
-    return ReprojectionError{camera_, measurement}.error(in_camera).squaredNorm() <= outlier_limit(measurement);
+    return ReprojectionError{camera_, measurement}.error(in_camera).squaredNorm() <=
+           outlier_limit(measurement);
   }
 
   // True if two landmarks became one.
@@ -84,8 +86,7 @@ class Fuser {
       map_.refresh(id);
       return false;
     }
-    const bool other_is_stronger =
-        map_.find(other)->observations.size() > map_.find(id)->observations.size();
+    const bool other_is_stronger = map_.find(other)->observations.size() > map_.find(id)->observations.size();
     map_.merge_landmarks(other_is_stronger ? id : other, other_is_stronger ? other : id);
     return true;
   }

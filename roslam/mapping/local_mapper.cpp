@@ -38,8 +38,8 @@ void LocalMapper::process(KeyframeId keyframe, const std::function<bool()>& shou
   {
     const Stopwatch watch;
     const std::scoped_lock lock(map_mutex_);
-    landmark_culler_.watch(landmarks_from_triangulation(map_, keyframe, camera_, settings_.noise, settings_.matcher,
-                                                        settings_.landmarks));
+    landmark_culler_.watch(landmarks_from_triangulation(map_, keyframe, camera_, settings_.noise,
+                                                        settings_.matcher, settings_.landmarks));
     times_.landmarks += watch.seconds();
   }
   {
@@ -113,7 +113,8 @@ LocalBundle LocalBundle::around(const Map& map, KeyframeId keyframe, const Measu
 void LocalBundle::apply_to(Map& map, const Camera& camera) const {
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     Keyframe* keyframe = map.find(keyframes[i]);
-    if (keyframe != nullptr && !problem.poses[i].is_fixed) keyframe->T_camera_world = problem.poses[i].T_camera_world;
+    if (keyframe != nullptr && !problem.poses[i].is_fixed)
+      keyframe->T_camera_world = problem.poses[i].T_camera_world;
   }
   for (std::size_t p = 0; p < landmarks.size(); ++p) {
     if (Landmark* landmark = map.find(landmarks[p])) landmark->position = problem.points[p];

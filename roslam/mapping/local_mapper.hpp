@@ -30,12 +30,12 @@ class LocalMapper {
   /// map_mutex guards the map against the tracker while process() runs on another thread.
   LocalMapper(const Camera& camera, Map& map, std::mutex& map_mutex, const Settings& settings);
 
-  /// Makes a keyframe of a tracked frame, with landmarks for all points of known depth. Quick; the caller holds the
-  /// mutex.
+  /// Makes a keyframe of a tracked frame, with landmarks for all points of known depth. Quick; the caller
+  /// holds the mutex.
   KeyframeId insert(const TrackedFrame& frame, std::size_t frame_index);
 
-  /// Culls, triangulates, fuses and adjusts around a keyframe. Slow; takes the mutex for the parts that touch the
-  /// map. should_stop ends bundle adjustment early, when the next keyframe waits.
+  /// Culls, triangulates, fuses and adjusts around a keyframe. Slow; takes the mutex for the parts that touch
+  /// the map. should_stop ends bundle adjustment early, when the next keyframe waits.
   void process(KeyframeId keyframe, const std::function<bool()>& should_stop = {});
 
   /// Seconds the last process() spent in each step, for the report.
@@ -64,13 +64,13 @@ struct LocalBundle {
   std::vector<KeyframeId> keyframes;  ///< of each pose
   std::vector<LandmarkId> landmarks;  ///< of each point
 
-  /// The keyframe, the keyframes that share enough landmarks with it, all their landmarks, and as fixed poses the
-  /// other keyframes that see those. The first keyframe is always fixed.
+  /// The keyframe, the keyframes that share enough landmarks with it, all their landmarks, and as fixed poses
+  /// the other keyframes that see those. The first keyframe is always fixed.
   static LocalBundle around(const Map& map, KeyframeId keyframe, const MeasurementNoise& noise,
                             const BundleAdjustmentOptions& options);
 
-  /// Takes the result over into the map and removes the observations that do not fit it. What was removed from the
-  /// map meanwhile is left alone.
+  /// Takes the result over into the map and removes the observations that do not fit it. What was removed
+  /// from the map meanwhile is left alone.
   void apply_to(Map& map, const Camera& camera) const;
 };
 

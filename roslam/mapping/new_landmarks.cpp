@@ -34,11 +34,14 @@ std::vector<std::uint32_t> free_points(const Keyframe& keyframe) {
 }
 
 std::optional<Eigen::Vector3d> triangulate_points(const Keyframe& a, std::uint32_t in_a, const Keyframe& b,
-                                                  std::uint32_t in_b, const Camera& camera, double min_parallax) {
+                                                  std::uint32_t in_b, const Camera& camera,
+                                                  double min_parallax) {
   const SE3 T_world_a = a.T_camera_world.inverse();
   const SE3 T_world_b = b.T_camera_world.inverse();
-  const Eigen::Vector3d ray_a = T_world_a.rotation() * camera.unproject(a.view->pixels[in_a].cast<double>(), 1.0);
-  const Eigen::Vector3d ray_b = T_world_b.rotation() * camera.unproject(b.view->pixels[in_b].cast<double>(), 1.0);
+  const Eigen::Vector3d ray_a =
+      T_world_a.rotation() * camera.unproject(a.view->pixels[in_a].cast<double>(), 1.0);
+  const Eigen::Vector3d ray_b =
+      T_world_b.rotation() * camera.unproject(b.view->pixels[in_b].cast<double>(), 1.0);
   const double cosine = ray_a.dot(ray_b) / (ray_a.norm() * ray_b.norm());
   if (cosine > std::cos(min_parallax * std::numbers::pi / 180.0)) return std::nullopt;
   return triangulate(T_world_a.translation(), ray_a, T_world_b.translation(), ray_b);
@@ -56,7 +59,8 @@ void NewLandmarkOptions::validate() const {
 }
 
 std::vector<LandmarkId> landmarks_from_depth(Map& map, KeyframeId id, const Camera& camera,
-                                             const MeasurementNoise& noise, const NewLandmarkOptions& options) {
+                                             const MeasurementNoise& noise,
+                                             const NewLandmarkOptions& options) {
   const Keyframe& keyframe = *map.find(id);
   const SE3 T_world_camera = keyframe.T_camera_world.inverse();
   std::vector<LandmarkId> made;
@@ -70,8 +74,10 @@ std::vector<LandmarkId> landmarks_from_depth(Map& map, KeyframeId id, const Came
   return made;
 }
 
-std::optional<Eigen::Vector3d> triangulate(const Eigen::Vector3d& origin_a, const Eigen::Vector3d& direction_a,
-                                           const Eigen::Vector3d& origin_b, const Eigen::Vector3d& direction_b) {
+std::optional<Eigen::Vector3d> triangulate(const Eigen::Vector3d& origin_a,
+                                           const Eigen::Vector3d& direction_a,
+                                           const Eigen::Vector3d& origin_b,
+                                           const Eigen::Vector3d& direction_b) {
   const Eigen::Vector3d a = direction_a.normalized();
   const Eigen::Vector3d b = direction_b.normalized();
   const Eigen::Vector3d between = origin_b - origin_a;
@@ -84,7 +90,8 @@ std::optional<Eigen::Vector3d> triangulate(const Eigen::Vector3d& origin_a, cons
 }
 
 std::vector<LandmarkId> landmarks_from_triangulation(Map& map, KeyframeId id, const Camera& camera,
-                                                     const MeasurementNoise& noise, const MatcherOptions& matcher,
+                                                     const MeasurementNoise& noise,
+                                                     const MatcherOptions& matcher,
                                                      const NewLandmarkOptions& options) {
   std::vector<LandmarkId> made;
   const Keyframe& keyframe = *map.find(id);
@@ -95,7 +102,8 @@ std::vector<LandmarkId> landmarks_from_triangulation(Map& map, KeyframeId id, co
     const auto free = free_points(keyframe);
     if (free.empty()) break;
     for (const auto& [ours, theirs] : match_descriptors(*keyframe.view, free, *neighbour.view, matcher)) {
-      const auto position = triangulate_points(keyframe, ours, neighbour, theirs, camera, options.min_parallax);
+      const auto position =
+          triangulate_points(keyframe, ours, neighbour, theirs, camera, options.min_parallax);
       if (!position || neighbour.landmarks[theirs].is_valid()) continue;
       if (!fits(map, keyframe, ours, *position, camera, noise) ||
           !fits(map, neighbour, theirs, *position, camera, noise)) {

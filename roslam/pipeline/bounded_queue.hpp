@@ -10,7 +10,8 @@
 
 namespace roslam {
 
-/// A queue between two threads that holds so many elements and no more: a newer one takes the place of the oldest.
+/// A queue between two threads that holds so many elements and no more: a newer one takes the place of the
+/// oldest.
 template <typename T>
 class BoundedQueue {
  public:

@@ -13,8 +13,8 @@
 
 namespace roslam {
 
-/// Hands keyframes to the mapper: at once in deterministic mode, through a bounded queue to a thread of its own in
-/// real-time mode.
+/// Hands keyframes to the mapper: at once in deterministic mode, through a bounded queue to a thread of its
+/// own in real-time mode.
 class MappingWorker {
  public:
   MappingWorker(LocalMapper& mapper, Mode mode, int queue_size);

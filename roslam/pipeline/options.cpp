@@ -7,7 +7,8 @@ namespace roslam {
 
 void ThreadOptions::validate() const {
   if (frame_queue < 1 || frame_queue > 1000) throw OptionsError("threads.frame_queue must be 1 to 1000");
-  if (keyframe_queue < 1 || keyframe_queue > 1000) throw OptionsError("threads.keyframe_queue must be 1 to 1000");
+  if (keyframe_queue < 1 || keyframe_queue > 1000)
+    throw OptionsError("threads.keyframe_queue must be 1 to 1000");
 }
 
 void Options::validate() const {

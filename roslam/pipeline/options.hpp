@@ -51,8 +51,8 @@ struct Options {
   LocalMapper::Settings mapper_settings() const;
 };
 
-/// Reads a configuration file (YAML); what it does not name keeps its default. Throws InputError for a file that is
-/// missing or not YAML, OptionsError naming a key that is unknown, of the wrong type or out of range.
+/// Reads a configuration file (YAML); what it does not name keeps its default. Throws InputError for a file
+/// that is missing or not YAML, OptionsError naming a key that is unknown, of the wrong type or out of range.
 Options read_options(const std::filesystem::path& file);
 
 /// The effective options as a configuration file that read_options reads back to the same values.

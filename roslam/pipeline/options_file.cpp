@@ -17,7 +17,8 @@ using Keys = std::map<std::string, std::set<std::string>>;
 Keys known_keys() {
   Keys keys;
   const Options options;
-  for_each_option(options, [&](const char* section, const char* key, const auto&) { keys[section].insert(key); });
+  for_each_option(options,
+                  [&](const char* section, const char* key, const auto&) { keys[section].insert(key); });
   return keys;
 }
 
@@ -34,7 +35,8 @@ std::string word_of(const std::filesystem::path& file, const YAML::Node& key) {
 
 // YAML readers take one of two equal keys without a word.
 void reject_repeated(const std::filesystem::path& file, std::set<std::string>& seen, const std::string& key) {
-  if (!seen.insert(key).second) throw OptionsError(file.string() + ": '" + key + "' is given twice; remove one");
+  if (!seen.insert(key).second)
+    throw OptionsError(file.string() + ": '" + key + "' is given twice; remove one");
 }
 
 void reject_unknown_keys(const std::filesystem::path& file, const YAML::Node& root) {
@@ -45,17 +47,18 @@ void reject_unknown_keys(const std::filesystem::path& file, const YAML::Node& ro
     reject_repeated(file, seen, name);
     const auto found = known.find(name);
     if (found == known.end()) {
-      throw OptionsError(file.string() + ": unknown section '" + name + "'; known: " +
-                         joined(known, [](const auto& entry) { return entry.first; }));
+      throw OptionsError(file.string() + ": unknown section '" + name +
+                         "'; known: " + joined(known, [](const auto& entry) { return entry.first; }));
     }
     if (section.second.IsNull()) continue;
-    if (!section.second.IsMap()) throw OptionsError(file.string() + ": '" + name + "' must hold 'key: value' lines");
+    if (!section.second.IsMap())
+      throw OptionsError(file.string() + ": '" + name + "' must hold 'key: value' lines");
     for (const auto& entry : section.second) {
       const auto key = word_of(file, entry.first);
       reject_repeated(file, seen, name + "." + key);
       if (!found->second.contains(key)) {
-        throw OptionsError(file.string() + ": unknown key '" + name + "." + key + "'; known: " +
-                           joined(found->second, [](const auto& k) { return k; }));
+        throw OptionsError(file.string() + ": unknown key '" + name + "." + key +
+                           "'; known: " + joined(found->second, [](const auto& k) { return k; }));
       }
     }
   }
@@ -67,13 +70,15 @@ Options read_options(const std::filesystem::path& file) {
   try {
     root = YAML::LoadFile(file.string());
   } catch (const YAML::BadFile&) {
-    throw InputError(file.string() + ": cannot open the configuration file; roslam run --print-config shows one");
+    throw InputError(file.string() +
+                     ": cannot open the configuration file; roslam run --print-config shows one");
   } catch (const std::exception& error) {  // of YAML, or of the stream where the file is a folder
     throw InputError(file.string() + ": not a valid YAML file: " + error.what());
   }
   Options options;
   if (root.IsNull()) return options;
-  if (!root.IsMap()) throw InputError(file.string() + ": a configuration file holds sections of 'key: value' lines");
+  if (!root.IsMap())
+    throw InputError(file.string() + ": a configuration file holds sections of 'key: value' lines");
   reject_unknown_keys(file, root);
   const YAML::Node& readable = root;  // so that asking for an absent section does not create it
   for_each_option(options, [&](const char* section, const char* key, auto& field) {
@@ -113,9 +118,8 @@ std::string options_to_yaml(const Options& options) {
 
 std::string options_to_json(const Options& options) {
   nlohmann::ordered_json json;
-  for_each_option(options, [&](const char* section, const char* key, const auto& field) {
-    json[section][key] = field;
-  });
+  for_each_option(
+      options, [&](const char* section, const char* key, const auto& field) { json[section][key] = field; });
   return json.dump();
 }
 

@@ -16,7 +16,9 @@ namespace roslam {
 namespace {
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 // Reads a source on a thread of its own and hands out frames at the pace of their timestamps.
 class PacedReader {
@@ -61,7 +63,8 @@ class PacedReader {
   // A recording with a gap of hours must not make the program seem to hang.
   static Clock::duration pause(double from, double to) {
     constexpr double kLongest = 1.0;  // seconds
-    return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::clamp(to - from, 0.0, kLongest)));
+    return std::chrono::duration_cast<Clock::duration>(
+        std::chrono::duration<double>(std::clamp(to - from, 0.0, kLongest)));
   }
 
   BoundedQueue<Frame> queue_;
@@ -74,7 +77,8 @@ class PacedReader {
 
 class Runner {
  public:
-  Runner(Slam& slam, const std::function<void(const FrameResult&)>& on_frame) : slam_(slam), on_frame_(on_frame) {}
+  Runner(Slam& slam, const std::function<void(const FrameResult&)>& on_frame)
+      : slam_(slam), on_frame_(on_frame) {}
 
   void follow(FrameSource& source, const std::stop_token& stop) {
     while (!stop.stop_requested()) {
@@ -139,7 +143,8 @@ RunSummary run(FrameSource& source, Slam& slam, const std::function<void(const F
                const std::stop_token& stop) {
   Runner runner(slam, on_frame);
   runner.attempt([&] {
-    slam.mode() == Mode::kDeterministic ? runner.follow(source, stop) : runner.follow_in_real_time(source, stop);
+    slam.mode() == Mode::kDeterministic ? runner.follow(source, stop)
+                                        : runner.follow_in_real_time(source, stop);
   });
   return runner.finish();
 }

@@ -12,21 +12,21 @@
 namespace roslam {
 
 struct RunSummary {
-  std::size_t dropped = 0;            ///< frames the tracker was too busy for (real-time mode)
-  std::size_t without_depth = 0;      ///< frames that came without a depth image
-  bool interrupted = false;           ///< stopped before the source ended
-  std::exception_ptr failure;         ///< what ended the run early, else null; the results until then are good
-  double wall_seconds = 0.0;          ///< from the first read to the last result
-  double first_pose_seconds = -1.0;   ///< from the first read to the first pose; negative = no pose
-  double start_up_seconds = -1.0;     ///< from the start of the process to the first pose; negative = not known
-  Trajectory truth;                   ///< true poses of the frames, where the source knows them
+  std::size_t dropped = 0;           ///< frames the tracker was too busy for (real-time mode)
+  std::size_t without_depth = 0;     ///< frames that came without a depth image
+  bool interrupted = false;          ///< stopped before the source ended
+  std::exception_ptr failure;        ///< what ended the run early, else null; the results until then are good
+  double wall_seconds = 0.0;         ///< from the first read to the last result
+  double first_pose_seconds = -1.0;  ///< from the first read to the first pose; negative = no pose
+  double start_up_seconds = -1.0;  ///< from the start of the process to the first pose; negative = not known
+  Trajectory truth;                ///< true poses of the frames, where the source knows them
 };
 
-/// Feeds a source through the pipeline until it ends or a stop is requested; the frame in work is finished first.
-/// In real-time mode frames come at the pace of their timestamps on a thread of their own, and what the tracker has
-/// no time for is dropped; a gap in the timestamps is waited for no longer than a second. on_frame is called on the
-/// calling thread after each frame. What the source or the pipeline throws ends the run and is kept in the summary, so
-/// that results can still be written.
+/// Feeds a source through the pipeline until it ends or a stop is requested; the frame in work is finished
+/// first. In real-time mode frames come at the pace of their timestamps on a thread of their own, and what
+/// the tracker has no time for is dropped; a gap in the timestamps is waited for no longer than a second.
+/// on_frame is called on the calling thread after each frame. What the source or the pipeline throws ends the
+/// run and is kept in the summary, so that results can still be written.
 RunSummary run(FrameSource& source, Slam& slam, const std::function<void(const FrameResult&)>& on_frame = {},
                const std::stop_token& stop = {});
 

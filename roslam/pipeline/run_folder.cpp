@@ -23,7 +23,8 @@ struct Result {
 void remove_old(const std::filesystem::path& file) {
   std::error_code error;
   std::filesystem::remove(file, error);
-  if (error) throw OutputError(file.string() + ": left by an earlier run and cannot be removed; choose another --out");
+  if (error)
+    throw OutputError(file.string() + ": left by an earlier run and cannot be removed; choose another --out");
 }
 
 void write_one(const Result& result, const std::filesystem::path& file) {
@@ -44,7 +45,8 @@ RunFolder::RunFolder(const std::filesystem::path& path) : path_(path) {
     throw OutputError(path.string() + ": cannot create the output folder; choose another --out");
   }
   if (std::filesystem::exists(path / "rgb.txt", error)) {
-    throw OutputError(path.string() + ": is a dataset, whose ground truth results could replace; choose another --out");
+    throw OutputError(path.string() +
+                      ": is a dataset, whose ground truth results could replace; choose another --out");
   }
   const auto probe = path / "run.json";
   write_file(probe, "{}\n");
@@ -57,8 +59,10 @@ void RunFolder::write(const Slam& slam, const RunSummary& summary, const FrameSo
   const std::vector<Result> results{
       {"trajectory.txt", [&](const Path& file) { write_trajectory(file, trajectory); }},
       {"keyframes.txt", [&](const Path& file) { write_trajectory(file, slam.keyframes()); }},
-      {"run.json", [&](const Path& file) { write_file(file, run_report(slam, summary, source, description)); }},
-      {"groundtruth.txt", [&](const Path& file) { write_trajectory(file, summary.truth); }, !summary.truth.empty()},
+      {"run.json",
+       [&](const Path& file) { write_file(file, run_report(slam, summary, source, description)); }},
+      {"groundtruth.txt", [&](const Path& file) { write_trajectory(file, summary.truth); },
+       !summary.truth.empty()},
       {"trajectory.png",
        [&](const Path& file) { write_png(file, plot_trajectory(trajectory, "RO-SLAM", WorldUp::kZ)); },
        !trajectory.empty()},

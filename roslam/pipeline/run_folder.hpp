@@ -26,12 +26,12 @@ struct RunDescription {
 ///   run.json        effective options, counts, times of every stage, memory
 class RunFolder {
  public:
-  /// Creates the folder. Throws OutputError at once, before any work is lost, if nothing can be written there or if
-  /// the folder is a dataset.
+  /// Creates the folder. Throws OutputError at once, before any work is lost, if nothing can be written there
+  /// or if the folder is a dataset.
   explicit RunFolder(const std::filesystem::path& path);
 
-  /// Writes all results, also those of a run that was interrupted or failed. What cannot be written does not keep the
-  /// others from being written; the first failure is thrown as OutputError at the end.
+  /// Writes all results, also those of a run that was interrupted or failed. What cannot be written does not
+  /// keep the others from being written; the first failure is thrown as OutputError at the end.
   void write(const Slam& slam, const RunSummary& summary, const FrameSource& source,
              const RunDescription& description) const;
 

@@ -52,7 +52,8 @@ Json frames_json(const Slam& slam, const RunSummary& summary, const FrameSource&
   return {{"in_source", source.size().value_or(arrived)},
           {"processed", slam.frames()},
           {"tracked", tracked},
-          {"tracked_share", slam.frames() == 0 ? 0.0 : static_cast<double>(tracked) / static_cast<double>(slam.frames())},
+          {"tracked_share",
+           slam.frames() == 0 ? 0.0 : static_cast<double>(tracked) / static_cast<double>(slam.frames())},
           {"dropped", summary.dropped},
           {"by_state", by_state},
           {"skipped", skipped},
@@ -85,7 +86,8 @@ Json times_json(const StageTimes& times) {
 double path_length(const Trajectory& trajectory) {
   double length = 0.0;
   for (std::size_t i = 1; i < trajectory.size(); ++i) {
-    length += (trajectory[i].T_world_camera.translation() - trajectory[i - 1].T_world_camera.translation()).norm();
+    length +=
+        (trajectory[i].T_world_camera.translation() - trajectory[i - 1].T_world_camera.translation()).norm();
   }
   return length;
 }
@@ -93,7 +95,8 @@ double path_length(const Trajectory& trajectory) {
 
 std::string run_report(const Slam& slam, const RunSummary& summary, const FrameSource& source,
                        const RunDescription& description) {
-  const double per_second = summary.wall_seconds > 0.0 ? static_cast<double>(slam.frames()) / summary.wall_seconds : 0.0;
+  const double per_second =
+      summary.wall_seconds > 0.0 ? static_cast<double>(slam.frames()) / summary.wall_seconds : 0.0;
   Json json;
   json["version"] = description.version;
   json["source"] = description.source;

@@ -59,8 +59,8 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
   note_times(extract_seconds, seconds);
   if (keyframe.is_valid()) mapping_.submit(keyframe);
 
-  FrameResult result{frame.index, frame.timestamp, tracked.state, std::nullopt, tracked.inliers, keyframe.is_valid(),
-                     seconds};
+  FrameResult result{frame.index,     frame.timestamp,     tracked.state, std::nullopt,
+                     tracked.inliers, keyframe.is_valid(), seconds};
   if (tracked.T_camera_world) result.T_world_camera = tracked.T_camera_world->inverse();
   return result;
 }
@@ -74,7 +74,8 @@ bool Slam::is_usable(const Frame& frame) {
   if (frame.colour.empty()) return reject("no colour image");
   if (frame.colour.type() != CV_8UC3) return reject("colour image is not 8-bit BGR");
   if (frame.colour.size() != size) return reject("colour image size differs from the camera's");
-  if (!frame.depth.empty() && frame.depth.type() != CV_32FC1) return reject("depth image is not 32-bit float");
+  if (!frame.depth.empty() && frame.depth.type() != CV_32FC1)
+    return reject("depth image is not 32-bit float");
   if (!frame.depth.empty() && frame.depth.size() != size) {
     return reject("depth image size differs from the colour image's");
   }
@@ -88,7 +89,8 @@ std::shared_ptr<const ObservedFrame> Slam::extract(const Frame& frame, const cv:
   cv::Mat grey;
   cv::cvtColor(frame.colour, grey, cv::COLOR_BGR2GRAY);
   const auto features = extractor_.extract(grey, mask);
-  return std::make_shared<ObservedFrame>(observe(features, frame.colour, frame.depth, camera_, options_.depth));
+  return std::make_shared<ObservedFrame>(
+      observe(features, frame.colour, frame.depth, camera_, options_.depth));
 }
 
 void Slam::record(const TrackedFrame& frame) {

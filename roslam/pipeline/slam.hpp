@@ -24,13 +24,13 @@ namespace roslam {
 
 /// What became of a frame.
 struct FrameResult {
-  std::size_t index = 0;                ///< of the frame in its source
-  double timestamp = 0.0;               ///< seconds
+  std::size_t index = 0;   ///< of the frame in its source
+  double timestamp = 0.0;  ///< seconds
   TrackingState state = TrackingState::kInitialising;
-  std::optional<SE3> T_world_camera;    ///< as known now; later corrections show in Slam::trajectory()
-  int inliers = 0;                      ///< landmarks the pose rests on
+  std::optional<SE3> T_world_camera;  ///< as known now; later corrections show in Slam::trajectory()
+  int inliers = 0;                    ///< landmarks the pose rests on
   bool is_keyframe = false;
-  double tracking_seconds = 0.0;        ///< processor time of the tracking thread
+  double tracking_seconds = 0.0;  ///< processor time of the tracking thread
 };
 
 /// The pipeline: frames in, trajectory and map out.
@@ -39,9 +39,9 @@ class Slam {
   /// Throws CalibrationError or OptionsError.
   Slam(const Camera& camera, const Options& options = {}, Mode mode = Mode::kDeterministic);
 
-  /// Tracks a frame and, if it becomes a keyframe, maps it (in real-time mode: on another thread). mask: empty, or
-  /// CV_8UC1 of the frame's size, nonzero where nothing may be used (things that can move). Frames that cannot be
-  /// used (wrong size or type, time not increasing) give nothing and are counted.
+  /// Tracks a frame and, if it becomes a keyframe, maps it (in real-time mode: on another thread). mask:
+  /// empty, or CV_8UC1 of the frame's size, nonzero where nothing may be used (things that can move). Frames
+  /// that cannot be used (wrong size or type, time not increasing) give nothing and are counted.
   std::optional<FrameResult> process(const Frame& frame, const cv::Mat& mask = {});
 
   /// Waits for the mapper. Call before reading results.

@@ -47,7 +47,8 @@ std::size_t peak_memory() {
 
 double process_age() {
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-  constexpr int kFieldsBetween = 19;  // from the state, which follows the name, to the start in ticks since boot
+  constexpr int kFieldsBetween =
+      19;  // from the state, which follows the name, to the start in ticks since boot
   std::string text;
   std::getline(std::ifstream("/proc/self/stat"), text);
   // The name stands in parentheses and may itself hold spaces and parentheses.

@@ -22,8 +22,8 @@ struct Frame {
   std::optional<SE3> T_world_camera;  ///< true pose where the source knows it; never used for tracking
 };
 
-/// Where frames come from: a recorded dataset, a simulation, later a live camera. Implementations skip frames they
-/// cannot read, count them by reason, and throw InputError only when the source as a whole is unusable.
+/// Where frames come from: a recorded dataset, a simulation, later a live camera. Implementations skip frames
+/// they cannot read, count them by reason, and throw InputError only when the source as a whole is unusable.
 class FrameSource {
  public:
   FrameSource() = default;

@@ -9,8 +9,9 @@ namespace roslam {
 
 /// An image read from a file, or why it could not be read.
 struct ImageFile {
-  cv::Mat image;      ///< empty on failure
-  std::string error;  ///< "is missing", "cannot be read", "is truncated", "cannot be decoded"; empty on success
+  cv::Mat image;  ///< empty on failure
+  std::string
+      error;  ///< "is missing", "cannot be read", "is truncated", "cannot be decoded"; empty on success
 };
 
 /// Reads a PNG or JPEG as CV_8UC3 (BGR). Half-written files are refused, not filled up with grey.

@@ -27,7 +27,9 @@ struct List {
 std::string excerpt(const std::string& line) {
   constexpr std::size_t kLength = 60;
   std::string shown = line.substr(0, kLength);
-  std::replace_if(shown.begin(), shown.end(), [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; }, '?');
+  std::replace_if(
+      shown.begin(), shown.end(), [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; },
+      '?');
   return line.size() > kLength ? shown + "..." : shown;
 }
 
@@ -43,7 +45,8 @@ std::optional<double> parse_time(const std::string& word) {
 List read_list(const std::filesystem::path& file) {
   std::ifstream in(file);
   if (!in || std::filesystem::is_directory(file)) {
-    throw InputError(file.string() + ": cannot open it; a TUM RGB-D folder holds rgb.txt, depth.txt and the images "
+    throw InputError(file.string() +
+                     ": cannot open it; a TUM RGB-D folder holds rgb.txt, depth.txt and the images "
                      "they name");
   }
   List list;
@@ -71,8 +74,8 @@ List read_list(const std::filesystem::path& file) {
   return list;
 }
 
-// Drops as few entries as leave the times strictly increasing, and says how many. Keeping each entry that comes later
-// than the one before would not do: a single time far in the future would cost all that follow.
+// Drops as few entries as leave the times strictly increasing, and says how many. Keeping each entry that
+// comes later than the one before would not do: a single time far in the future would cost all that follow.
 std::size_t drop_out_of_order(std::vector<TimedFile>& entries) {
   // Longest increasing subsequence: last_of[n] ends the one of n + 1 entries that ends earliest in time.
   std::vector<std::size_t> last_of;
@@ -105,7 +108,8 @@ void count(std::map<std::string, std::size_t>& counts, const char* reason, std::
 
 void TumOptions::validate() const {
   if (!(max_time_difference >= 0.0 && max_time_difference < 10.0)) {
-    throw OptionsError("max_time_difference must be 0 to 10 seconds, got " + std::to_string(max_time_difference));
+    throw OptionsError("max_time_difference must be 0 to 10 seconds, got " +
+                       std::to_string(max_time_difference));
   }
 }
 
@@ -120,9 +124,10 @@ std::vector<int> associate(const std::vector<TimedFile>& colour, const std::vect
   for (std::size_t i = 0; i < colour.size(); ++i) {
     const auto first = std::lower_bound(depth.begin(), depth.end(), colour[i].timestamp - max_time_difference,
                                         [](const TimedFile& d, double time) { return d.timestamp < time; });
-    for (auto it = first; it != depth.end() && it->timestamp <= colour[i].timestamp + max_time_difference; ++it) {
-      pairs.push_back({std::abs(it->timestamp - colour[i].timestamp), i,
-                       static_cast<std::size_t>(it - depth.begin())});
+    for (auto it = first; it != depth.end() && it->timestamp <= colour[i].timestamp + max_time_difference;
+         ++it) {
+      pairs.push_back(
+          {std::abs(it->timestamp - colour[i].timestamp), i, static_cast<std::size_t>(it - depth.begin())});
     }
   }
   // Closest pairs first, so that no image is taken by a neighbour it fits less well.
@@ -176,8 +181,8 @@ std::optional<Frame> TumSource::read(std::size_t index) {
   }
   const cv::Size expected(camera_.width, camera_.height);
   if (colour.image.size() != expected) {
-    ++skipped_["colour image is " + size_in_words(colour.image.size()) + " but the camera " + size_in_words(expected) +
-               " pixels"];
+    ++skipped_["colour image is " + size_in_words(colour.image.size()) + " but the camera " +
+               size_in_words(expected) + " pixels"];
     return std::nullopt;
   }
   Frame frame;

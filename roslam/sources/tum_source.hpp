@@ -23,19 +23,19 @@ struct TimedFile {
   std::filesystem::path file;  ///< relative to the dataset folder
 };
 
-/// Pairs each colour image with the depth image nearest in time; each depth image serves once. The result holds an
-/// index into depth or -1, one for each colour image. Both lists must be sorted by time.
+/// Pairs each colour image with the depth image nearest in time; each depth image serves once. The result
+/// holds an index into depth or -1, one for each colour image. Both lists must be sorted by time.
 std::vector<int> associate(const std::vector<TimedFile>& colour, const std::vector<TimedFile>& depth,
                            double max_time_difference);
 
 /// A folder in the TUM RGB-D format: rgb.txt, depth.txt and the images they name (PNG or JPEG; depth 16-bit).
 /// A colour image without a depth image near in time is given with an empty depth; images that are missing,
-/// truncated, of the wrong size, without a time or out of the order of time are skipped and counted. Of images out of
-/// order as few are skipped as leave the others in order.
+/// truncated, of the wrong size, without a time or out of the order of time are skipped and counted. Of
+/// images out of order as few are skipped as leave the others in order.
 class TumSource : public FrameSource {
  public:
-  /// Throws InputError if the folder or a list is missing, malformed or names no image, CalibrationError if the
-  /// camera is absurd.
+  /// Throws InputError if the folder or a list is missing, malformed or names no image, CalibrationError if
+  /// the camera is absurd.
   TumSource(const std::filesystem::path& folder, const Camera& camera, const TumOptions& options = {});
 
   std::optional<Frame> next() override;

@@ -21,14 +21,17 @@ void KeyframePolicyOptions::validate() const {
     if (!condition) throw OptionsError(std::string("keyframes.") + message);
   };
   require(max_interval > 0.0, "max_interval must be positive (seconds)");
-  require(min_interval >= 0.0 && min_interval <= max_interval, "min_interval must be 0 to max_interval (seconds)");
+  require(min_interval >= 0.0 && min_interval <= max_interval,
+          "min_interval must be 0 to max_interval (seconds)");
   require(min_overlap > 0.0 && min_overlap < 1.0, "min_overlap must lie between 0 and 1");
   require(min_tracked_near >= 0, "min_tracked_near must not be negative");
   require(min_new_near >= 0, "min_new_near must not be negative");
   require(near > 0.0, "near must be positive (metres)");
 }
 
-KeyframePolicy::KeyframePolicy(const KeyframePolicyOptions& options) : options_(options) { options_.validate(); }
+KeyframePolicy::KeyframePolicy(const KeyframePolicyOptions& options) : options_(options) {
+  options_.validate();
+}
 
 bool KeyframePolicy::promotes(const TrackedFrame& frame, const Map& map, bool mapper_idle) const {
   if (frame.state != TrackingState::kTracking) return false;

@@ -9,12 +9,12 @@
 namespace roslam {
 
 struct KeyframePolicyOptions {
-  double max_interval = 1.0;       ///< seconds after which a keyframe is taken if the mapper is idle
-  double min_interval = 0.0;       ///< seconds between keyframes at least
-  double min_overlap = 0.6;        ///< share of the reference keyframe's landmarks below which a new one is due
-  int min_tracked_near = 100;      ///< with fewer near landmarks tracked, and many near points unused, one is due
-  int min_new_near = 70;           ///< near points without a landmark that make a keyframe worth it
-  double near = 3.0;               ///< metres; what is nearer counts as near
+  double max_interval = 1.0;   ///< seconds after which a keyframe is taken if the mapper is idle
+  double min_interval = 0.0;   ///< seconds between keyframes at least
+  double min_overlap = 0.6;    ///< share of the reference keyframe's landmarks below which a new one is due
+  int min_tracked_near = 100;  ///< with fewer near landmarks tracked, and many near points unused, one is due
+  int min_new_near = 70;       ///< near points without a landmark that make a keyframe worth it
+  double near = 3.0;           ///< metres; what is nearer counts as near
 
   /// Throws OptionsError naming the field.
   void validate() const;

@@ -8,8 +8,8 @@
 namespace roslam {
 
 struct LocalMapOptions {
-  int max_keyframes = 40;     ///< keyframes whose landmarks are searched for
-  int neighbours = 5;         ///< covisible keyframes added for each keyframe that sees the frame's landmarks
+  int max_keyframes = 40;  ///< keyframes whose landmarks are searched for
+  int neighbours = 5;      ///< covisible keyframes added for each keyframe that sees the frame's landmarks
 
   /// Throws OptionsError naming the field.
   void validate() const;

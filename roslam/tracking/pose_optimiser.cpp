@@ -18,7 +18,8 @@ struct NormalEquations {
 };
 
 // Adds one measurement; T_camera_world is perturbed from the left.
-void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, bool robust, NormalEquations& system) {
+void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, bool robust,
+         NormalEquations& system) {
   const Eigen::Vector3d error = term.error(point_camera);
   const Eigen::Matrix3d by_point = term.jacobian(point_camera);
   Eigen::Matrix<double, 3, 6> jacobian;
@@ -52,7 +53,8 @@ OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurem
       }
       system.hessian.diagonal().array() += 1e-9;  // keeps a degenerate system solvable
       const Vector6d step = -system.hessian.selfadjointView<Eigen::Lower>().ldlt().solve(system.gradient);
-      if (!step.allFinite()) return {initial_T_camera_world, std::vector<bool>(measurements.size(), false), 0};
+      if (!step.allFinite())
+        return {initial_T_camera_world, std::vector<bool>(measurements.size(), false), 0};
       result.T_camera_world = SE3::exp(step) * result.T_camera_world;
       if (step.norm() < kConverged) break;
     }
@@ -60,8 +62,8 @@ OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurem
     for (std::size_t i = 0; i < measurements.size(); ++i) {
       const Eigen::Vector3d point = result.T_camera_world * measurements[i].point_world;
       const ReprojectionError term{camera, measurements[i].measurement};
-      result.is_inlier[i] =
-          point.z() > kMinDepth && term.error(point).squaredNorm() <= outlier_limit(measurements[i].measurement);
+      result.is_inlier[i] = point.z() > kMinDepth &&
+                            term.error(point).squaredNorm() <= outlier_limit(measurements[i].measurement);
       result.inliers += result.is_inlier[i] ? 1 : 0;
     }
   }

@@ -30,9 +30,9 @@ struct OptimisedPose {
   int inliers = 0;
 };
 
-/// The camera pose that fits the measurements best: Gauss-Newton on the reprojection and depth errors with Huber
-/// weights; outliers by the chi-squared test are set aside and may come back. With fewer than three measurements
-/// the initial pose is returned without inliers.
+/// The camera pose that fits the measurements best: Gauss-Newton on the reprojection and depth errors with
+/// Huber weights; outliers by the chi-squared test are set aside and may come back. With fewer than three
+/// measurements the initial pose is returned without inliers.
 OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurement>& measurements,
                             const SE3& initial_T_camera_world, const PoseOptimiserOptions& options = {});
 

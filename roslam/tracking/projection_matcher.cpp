@@ -19,7 +19,8 @@ void MatcherOptions::validate() const {
     if (!condition) throw OptionsError(std::string("matcher.") + message);
   };
   require(max_distance >= 0 && max_distance <= kDescriptorBits, "max_distance must be 0 to 256 bits");
-  require(strict_distance >= 0 && strict_distance <= kDescriptorBits, "strict_distance must be 0 to 256 bits");
+  require(strict_distance >= 0 && strict_distance <= kDescriptorBits,
+          "strict_distance must be 0 to 256 bits");
   require(ratio > 0.0 && ratio <= 1.0, "ratio must be above 0 and at most 1");
   require(frame_radius > 0.0 && frame_radius < 1000.0, "frame_radius must be 0 to 1000 pixels");
   require(map_radius > 0.0 && map_radius < 1000.0, "map_radius must be 0 to 1000 pixels");
@@ -47,7 +48,8 @@ int ProjectionMatcher::find(const Query& query, const Descriptor& descriptor, co
   candidates_.clear();
   frame.grid.find(query.pixel, query.radius, nearby_);
   for (const std::uint32_t i : nearby_) {
-    if (frame.levels[i] < query.min_level || frame.levels[i] > query.max_level || taken[i].is_valid()) continue;
+    if (frame.levels[i] < query.min_level || frame.levels[i] > query.max_level || taken[i].is_valid())
+      continue;
     const float depth = frame.depths[i];
     if (query.depth > 0.0F && depth > 0.0F &&
         std::abs(depth - query.depth) > static_cast<float>(options_.depth_tolerance) * query.depth) {

@@ -13,13 +13,13 @@
 namespace roslam {
 
 struct MatcherOptions {
-  int max_distance = 100;          ///< bits, for matches whose place in the image is predicted
-  int strict_distance = 50;        ///< bits, for matches searched over whole images and for fusion
-  double ratio = 0.8;              ///< best to second best distance, where both lie on one level
-  double frame_radius = 7.0;       ///< pixels at the finest level, search from the last frame
-  double map_radius = 3.0;         ///< pixels at the finest level, search for landmarks of the local map
-  double fuse_radius = 3.0;        ///< pixels at the finest level, search for duplicates of landmarks
-  double depth_tolerance = 0.1;    ///< share of the depth a match may be off by
+  int max_distance = 100;        ///< bits, for matches whose place in the image is predicted
+  int strict_distance = 50;      ///< bits, for matches searched over whole images and for fusion
+  double ratio = 0.8;            ///< best to second best distance, where both lie on one level
+  double frame_radius = 7.0;     ///< pixels at the finest level, search from the last frame
+  double map_radius = 3.0;       ///< pixels at the finest level, search for landmarks of the local map
+  double fuse_radius = 3.0;      ///< pixels at the finest level, search for duplicates of landmarks
+  double depth_tolerance = 0.1;  ///< share of the depth a match may be off by
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -28,12 +28,13 @@ struct MatcherOptions {
 /// A landmark as it should appear in an image.
 struct Prediction {
   Eigen::Vector2f pixel;
-  float depth = 0.0F;         ///< metres along the optical axis
-  int level = 0;              ///< pyramid level it should be found on
-  float view_cosine = 1.0F;   ///< angle between the direction it is seen from now and its mean direction
+  float depth = 0.0F;        ///< metres along the optical axis
+  int level = 0;             ///< pyramid level it should be found on
+  float view_cosine = 1.0F;  ///< angle between the direction it is seen from now and its mean direction
 };
 
-/// Nothing if the landmark lies behind the camera, outside the image, too near or far, or is seen from the side.
+/// Nothing if the landmark lies behind the camera, outside the image, too near or far, or is seen from the
+/// side.
 std::optional<Prediction> predict(const Landmark& landmark, const Map& map, const ObservedFrame& frame,
                                   const Camera& camera, const SE3& T_camera_world);
 
@@ -45,12 +46,12 @@ class ProjectionMatcher {
   /// One search: where, on which levels, how deep.
   struct Query {
     Eigen::Vector2f pixel;
-    float radius = 0.0F;       ///< pixels of the full image
+    float radius = 0.0F;  ///< pixels of the full image
     int min_level = 0;
     int max_level = 0;
-    float depth = 0.0F;        ///< metres, 0 = any
-    int max_distance = 0;      ///< bits
-    bool use_ratio = false;    ///< refuse if the second best is nearly as good
+    float depth = 0.0F;      ///< metres, 0 = any
+    int max_distance = 0;    ///< bits
+    bool use_ratio = false;  ///< refuse if the second best is nearly as good
   };
 
   /// The point of the frame that fits best and is not taken; -1 if there is none.
@@ -65,8 +66,8 @@ class ProjectionMatcher {
   std::vector<std::uint32_t> candidates_;
 };
 
-/// Pairs (index in a, index in b) of points whose descriptors are each other's clear nearest; indices of a are
-/// limited to `from`.
+/// Pairs (index in a, index in b) of points whose descriptors are each other's clear nearest; indices of a
+/// are limited to `from`.
 std::vector<std::pair<std::uint32_t, std::uint32_t>> match_descriptors(const ObservedFrame& a,
                                                                        const std::vector<std::uint32_t>& from,
                                                                        const ObservedFrame& b,

@@ -25,8 +25,8 @@ void RelocaliserOptions::validate() const {
   if (!(max_error > 0.0)) throw OptionsError("relocaliser.max_error must be positive (pixels)");
 }
 
-std::optional<RelocalisedPose> Relocaliser::find(const Map& map, const ObservedFrame& frame, const Camera& camera,
-                                                 bool search_all) {
+std::optional<RelocalisedPose> Relocaliser::find(const Map& map, const ObservedFrame& frame,
+                                                 const Camera& camera, bool search_all) {
   std::vector<KeyframeId> keyframes = map.keyframe_ids();
   std::reverse(keyframes.begin(), keyframes.end());
   if (keyframes.empty()) return std::nullopt;
@@ -41,7 +41,8 @@ std::optional<RelocalisedPose> Relocaliser::find(const Map& map, const ObservedF
 }
 
 std::optional<RelocalisedPose> Relocaliser::try_keyframe(const Map& map, const Keyframe& keyframe,
-                                                         const ObservedFrame& frame, const Camera& camera) const {
+                                                         const ObservedFrame& frame,
+                                                         const Camera& camera) const {
   std::vector<std::uint32_t> known;
   for (std::uint32_t i = 0; i < keyframe.landmarks.size(); ++i) {
     if (keyframe.landmarks[i].is_valid()) known.push_back(i);
@@ -63,13 +64,14 @@ std::optional<RelocalisedPose> Relocaliser::try_keyframe(const Map& map, const K
   bool found = false;
   try {
     found = cv::solvePnPRansac(points, pixels, matrix, cv::noArray(), rotation, translation, false,
-                               options_.iterations, static_cast<float>(options_.max_error), kConfidence, inliers,
-                               cv::SOLVEPNP_P3P);
+                               options_.iterations, static_cast<float>(options_.max_error), kConfidence,
+                               inliers, cv::SOLVEPNP_P3P);
   } catch (const cv::Exception&) {  // a degenerate sample
     return std::nullopt;
   }
   if (!found || static_cast<int>(inliers.size()) < options_.min_inliers) return std::nullopt;
-  RelocalisedPose result{from_rodrigues(rotation, translation), std::vector<LandmarkId>(frame.size()), keyframe.id};
+  RelocalisedPose result{from_rodrigues(rotation, translation), std::vector<LandmarkId>(frame.size()),
+                         keyframe.id};
   if (!result.T_camera_world.is_finite()) return std::nullopt;
   for (const int i : inliers) {
     const auto& [in_keyframe, in_frame] = matches[static_cast<std::size_t>(i)];

@@ -12,11 +12,11 @@
 namespace roslam {
 
 struct RelocaliserOptions {
-  int min_matches = 15;       ///< matches with a keyframe that make it worth a pose estimate
-  int min_inliers = 12;       ///< matches that must agree on a pose
-  int candidates = 6;         ///< keyframes tried for one frame
-  int iterations = 200;       ///< RANSAC samples for a keyframe, at most
-  double max_error = 4.0;     ///< pixels a match may be off its reprojection
+  int min_matches = 15;    ///< matches with a keyframe that make it worth a pose estimate
+  int min_inliers = 12;    ///< matches that must agree on a pose
+  int candidates = 6;      ///< keyframes tried for one frame
+  int iterations = 200;    ///< RANSAC samples for a keyframe, at most
+  double max_error = 4.0;  ///< pixels a match may be off its reprojection
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -29,19 +29,21 @@ struct RelocalisedPose {
   KeyframeId keyframe;                ///< the one that was recognised
 };
 
-/// Recovers the pose of a frame from descriptor matches with the landmarks of single keyframes: P3P in RANSAC.
+/// Recovers the pose of a frame from descriptor matches with the landmarks of single keyframes: P3P in
+/// RANSAC.
 class Relocaliser {
  public:
   Relocaliser(const RelocaliserOptions& options, const MatcherOptions& matcher)
       : options_(options), matcher_(matcher) {}
 
-  /// Tries the newest keyframes first; with search_all, works its way through all keyframes from call to call.
+  /// Tries the newest keyframes first; with search_all, works its way through all keyframes from call to
+  /// call.
   std::optional<RelocalisedPose> find(const Map& map, const ObservedFrame& frame, const Camera& camera,
                                       bool search_all);
 
  private:
-  std::optional<RelocalisedPose> try_keyframe(const Map& map, const Keyframe& keyframe, const ObservedFrame& frame,
-                                              const Camera& camera) const;
+  std::optional<RelocalisedPose> try_keyframe(const Map& map, const Keyframe& keyframe,
+                                              const ObservedFrame& frame, const Camera& camera) const;
 
   RelocaliserOptions options_;
   MatcherOptions matcher_;

@@ -43,7 +43,8 @@ void TrackerOptions::validate() const {
   if (min_initial_points < 10) throw OptionsError("tracker.min_initial_points must be at least 10");
   if (min_inliers < 6) throw OptionsError("tracker.min_inliers must be at least 6");
   if (min_frame_matches < 6) throw OptionsError("tracker.min_frame_matches must be at least 6");
-  if (!(min_agreement >= 0.0 && min_agreement <= 1.0)) throw OptionsError("tracker.min_agreement must be 0 to 1");
+  if (!(min_agreement >= 0.0 && min_agreement <= 1.0))
+    throw OptionsError("tracker.min_agreement must be 0 to 1");
   if (recently_lost_frames < 0) throw OptionsError("tracker.recently_lost_frames must not be negative");
 }
 
@@ -70,7 +71,8 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   frame.view = std::move(view);
   if (map_.keyframe_count() == 0) return initialise(std::move(frame));
 
-  const bool found = state_ == TrackingState::kTracking ? follow(frame) || relocalise(frame) : relocalise(frame);
+  const bool found =
+      state_ == TrackingState::kTracking ? follow(frame) || relocalise(frame) : relocalise(frame);
   if (found) {
     state_ = TrackingState::kTracking;
     frames_lost_ = 0;
@@ -104,10 +106,11 @@ TrackedFrame Tracker::initialise(TrackedFrame frame) {
 bool Tracker::follow(TrackedFrame& frame) {
   const SE3 predicted = predict_pose(frame.timestamp);
   constexpr float kWider = 3.0F;
-  // Where the motion is unknown, what lies near in the image may be the wrong thing: descriptors alone decide.
+  // Where the motion is unknown, what lies near in the image may be the wrong thing: descriptors alone
+  // decide.
   const bool is_predictable = velocity_age_ >= 0.0;
-  const bool matched = (is_predictable && match_last_frame(frame, predicted, 1.0F)) || match_reference(frame) ||
-                       match_last_frame(frame, predicted, kWider);
+  const bool matched = (is_predictable && match_last_frame(frame, predicted, 1.0F)) ||
+                       match_reference(frame) || match_last_frame(frame, predicted, kWider);
   return matched && refine_with_local_map(frame);
 }
 
@@ -141,7 +144,8 @@ bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float 
     const Eigen::Vector2f pixel = camera_.project(in_camera).cast<float>();
     if (!frame.view->grid.contains(pixel)) continue;
     const int level = last.levels[i];
-    const float radius = radius_factor * static_cast<float>(settings_.matcher.frame_radius) * map_.scale(level);
+    const float radius =
+        radius_factor * static_cast<float>(settings_.matcher.frame_radius) * map_.scale(level);
     const int match = matcher_.find({pixel, radius, level - 1, level + 1, static_cast<float>(in_camera.z()),
                                      settings_.matcher.max_distance, false},
                                     last.descriptors[i], *frame.view, frame.landmarks);
@@ -181,7 +185,8 @@ bool Tracker::match_reference(TrackedFrame& frame) {
   frame.landmarks.assign(frame.view->size(), {});
   std::vector<Eigen::Vector3d> positions;
   std::vector<std::uint32_t> points;
-  for (const auto& [theirs, ours] : match_descriptors(*reference->view, known, *frame.view, settings_.matcher)) {
+  for (const auto& [theirs, ours] :
+       match_descriptors(*reference->view, known, *frame.view, settings_.matcher)) {
     frame.landmarks[ours] = reference->landmarks[theirs];
     positions.push_back(map_.find(reference->landmarks[theirs])->position);
     points.push_back(ours);
@@ -226,7 +231,8 @@ void Tracker::match_local_landmarks(TrackedFrame& frame, const std::vector<Landm
   for (const LandmarkId id : frame.landmarks) {
     if (id.is_valid()) is_matched[id.index()] = true;
   }
-  constexpr float kFrontal = 0.998F;  // seen from almost the same direction, a landmark is searched for more closely
+  constexpr float kFrontal =
+      0.998F;  // seen from almost the same direction, a landmark is searched for more closely
   for (const LandmarkId id : landmarks) {
     if (is_matched[id.index()]) continue;
     Landmark& landmark = *map_.find(id);

@@ -28,11 +28,11 @@ enum class TrackingState {
 std::string_view name_of(TrackingState state);
 
 struct TrackerOptions {
-  int min_initial_points = 80;     ///< points of known depth the first keyframe needs
-  int min_inliers = 20;            ///< landmarks a pose must rest on
-  int min_frame_matches = 15;      ///< matches with the last frame that a first estimate must rest on
-  double min_agreement = 0.5;      ///< share of those matches that must agree on it, else matching was by chance
-  int recently_lost_frames = 30;   ///< frames after which recently lost becomes lost
+  int min_initial_points = 80;  ///< points of known depth the first keyframe needs
+  int min_inliers = 20;         ///< landmarks a pose must rest on
+  int min_frame_matches = 15;   ///< matches with the last frame that a first estimate must rest on
+  double min_agreement = 0.5;   ///< share of those matches that must agree on it, else matching was by chance
+  int recently_lost_frames = 30;  ///< frames after which recently lost becomes lost
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -41,17 +41,17 @@ struct TrackerOptions {
 /// What tracking found out about a frame.
 struct TrackedFrame {
   TrackingState state = TrackingState::kInitialising;
-  double timestamp = 0.0;                     ///< seconds
+  double timestamp = 0.0;  ///< seconds
   std::shared_ptr<const ObservedFrame> view;
-  std::optional<SE3> T_camera_world;          ///< empty unless state is kTracking
-  std::vector<LandmarkId> landmarks;          ///< landmark each point shows, or none; inliers only
-  int inliers = 0;                            ///< landmarks the pose rests on
-  KeyframeId reference;                       ///< keyframe that shares most landmarks; none before the first keyframe
+  std::optional<SE3> T_camera_world;  ///< empty unless state is kTracking
+  std::vector<LandmarkId> landmarks;  ///< landmark each point shows, or none; inliers only
+  int inliers = 0;                    ///< landmarks the pose rests on
+  KeyframeId reference;               ///< keyframe that shares most landmarks; none before the first keyframe
 };
 
-/// Estimates the pose of each frame against the map: predicts it from the motion so far, matches with the last
-/// frame, then with the local map; recovers against the keyframes when lost. Changes nothing in the map but the
-/// landmarks' counters of predicted and found.
+/// Estimates the pose of each frame against the map: predicts it from the motion so far, matches with the
+/// last frame, then with the local map; recovers against the keyframes when lost. Changes nothing in the map
+/// but the landmarks' counters of predicted and found.
 class Tracker {
  public:
   struct Settings {
@@ -93,7 +93,8 @@ class Tracker {
                 const std::vector<std::uint32_t>& points, int min_inliers);
   bool first_estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
                       const std::vector<std::uint32_t>& points);
-  void match_local_landmarks(TrackedFrame& frame, const std::vector<LandmarkId>& landmarks, double radius_factor);
+  void match_local_landmarks(TrackedFrame& frame, const std::vector<LandmarkId>& landmarks,
+                             double radius_factor);
   void count_predictions(const TrackedFrame& frame);
   SE3 predict_pose(double timestamp) const;
   SE3 last_pose() const;
@@ -107,10 +108,10 @@ class Tracker {
   Relocaliser relocaliser_;
 
   TrackingState state_ = TrackingState::kInitialising;
-  TrackedFrame last_;             // the last frame with a pose
-  SE3 T_last_reference_;          // its pose in its reference keyframe, which bundle adjustment may move
+  TrackedFrame last_;     // the last frame with a pose
+  SE3 T_last_reference_;  // its pose in its reference keyframe, which bundle adjustment may move
   Vector6d velocity_ = Vector6d::Zero();  // twist of T_current_last, per second
-  double velocity_age_ = -1.0;    // time of the frame velocity_ was measured at; negative = unknown
+  double velocity_age_ = -1.0;            // time of the frame velocity_ was measured at; negative = unknown
   int frames_lost_ = 0;
   Times times_;
 };
