@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -10,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
+#include "tests/program.hpp"
 #include "tests/scratch.hpp"
 
 namespace roslam {
@@ -17,18 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string error;
-};
-
-std::string content(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 class BenchmarkStatic : public testing::Test {
  protected:
@@ -40,12 +28,7 @@ class BenchmarkStatic : public testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  Outcome shell(const std::string& command) const {
-    const std::string whole = "cd '" + folder_.string() + "' && " + command + " >stdout 2>stderr";
-    const int status = std::system(whole.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(folder_ / "stdout"),
-            content(folder_ / "stderr")};
-  }
+  Outcome shell(const std::string& command) const { return shell_in(folder_, command); }
   Outcome roslam(const std::string& arguments) const { return shell("'" ROSLAM_PROGRAM "' " + arguments); }
 };
 

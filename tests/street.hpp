@@ -18,6 +18,7 @@
 
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/sources/tum_source.hpp"
+#include "tests/program.hpp"
 #include "tests/scratch.hpp"
 
 /// Tests on a short flight along the simulated street without traffic. The program record_street renders it
@@ -47,11 +48,6 @@ inline std::vector<Frame> frames() {
   return all;
 }
 
-inline std::string content(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 inline void put(const fs::path& file, const std::string& bytes) {
   fs::remove_all(file);  // what is there may be a link to the recorded image
   std::ofstream(file, std::ios::binary) << bytes;
@@ -61,12 +57,6 @@ inline void put_image(const fs::path& file, const cv::Mat& image) {
   fs::remove_all(file);
   cv::imwrite(file.string(), image);
 }
-
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string error;
-};
 
 /// Runs the program and waits for it.
 inline Outcome run_program(const std::string& arguments, const fs::path& scratch,

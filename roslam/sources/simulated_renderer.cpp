@@ -286,16 +286,20 @@ void Renderer::smooth_edges(const Eye& eye, const std::vector<cv::Point>& pixels
   }
 }
 
+Renderer::Eye Renderer::eye_at(const SE3& T_world_camera) const {
+  return {T_world_camera.translation().cast<float>(),
+          T_world_camera.rotation().toRotationMatrix().cast<float>(),
+          static_cast<float>(camera_.cx),
+          static_cast<float>(camera_.cy),
+          static_cast<float>(1.0 / camera_.fx),
+          static_cast<float>(1.0 / camera_.fy)};
+}
+
 Picture Renderer::draw(const SE3& T_world_camera) const {
   const cv::Size size(camera_.width, camera_.height);
   Picture picture{cv::Mat(size, CV_32FC3), cv::Mat(size, CV_32FC1), cv::Mat(size, CV_8UC1),
                   cv::Mat(size, CV_16UC1), cv::Mat(size, CV_32SC1), cv::Mat(size, CV_8UC1)};
-  const Eye eye{T_world_camera.translation().cast<float>(),
-                T_world_camera.rotation().toRotationMatrix().cast<float>(),
-                static_cast<float>(camera_.cx),
-                static_cast<float>(camera_.cy),
-                static_cast<float>(1.0 / camera_.fx),
-                static_cast<float>(1.0 / camera_.fy)};
+  const Eye eye = eye_at(T_world_camera);
   std::vector<cv::Point> pixels;  // in blocks of 4 by 2, whose rays stay close together
   pixels.reserve(static_cast<std::size_t>(size.area()));
   for (int y = 0; y < size.height; y += 2) {
@@ -314,12 +318,7 @@ Picture Renderer::draw(const SE3& T_world_camera) const {
 Picture Renderer::without_movables(const SE3& T_world_camera, const Picture& picture) const {
   Picture background{picture.colour.clone(),    picture.depth.clone(), picture.labels.clone(),
                      picture.instances.clone(), picture.parts.clone(), picture.touched.clone()};
-  const Eye eye{T_world_camera.translation().cast<float>(),
-                T_world_camera.rotation().toRotationMatrix().cast<float>(),
-                static_cast<float>(camera_.cx),
-                static_cast<float>(camera_.cy),
-                static_cast<float>(1.0 / camera_.fx),
-                static_cast<float>(1.0 / camera_.fy)};
+  const Eye eye = eye_at(T_world_camera);
   std::vector<cv::Point> pixels;
   for (int y = 0; y < picture.touched.rows; ++y) {
     for (int x = 0; x < picture.touched.cols; ++x) {

@@ -54,6 +54,7 @@ class Renderer {
   struct Eye;
   struct Hits;
 
+  Eye eye_at(const SE3& T_world_camera) const;
   void sample(const Eye& eye, const Points& points, int group, bool movables, Samples& samples) const;
   void trace(const Eye& eye, const Points& points, bool movables, Hits& hits) const;
   void light(const Eye& eye, bool movables, Hits& hits) const;
