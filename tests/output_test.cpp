@@ -162,7 +162,10 @@ TEST_P(Interrupt, EndsSoonAndWritesWhatIsThere) {
             json["frames"]["processed"].get<std::size_t>());
 }
 
-INSTANTIATE_TEST_SUITE_P(Modes, Interrupt, testing::Values("--deterministic", "--real-time"));
+INSTANTIATE_TEST_SUITE_P(Modes, Interrupt, testing::Values("--deterministic", "--real-time"),
+                         [](const auto& info) {
+                           return std::string(info.param) == "--real-time" ? "RealTime" : "Deterministic";
+                         });
 
 }  // namespace
 }  // namespace roslam::street
