@@ -163,8 +163,8 @@ TEST_P(Interrupt, EndsSoonAndWritesWhatIsThere) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, Interrupt, testing::Values("--deterministic", "--real-time"),
-                         [](const auto& info) {
-                           return std::string(info.param) == "--real-time" ? "RealTime" : "Deterministic";
+                         [](const auto& tested) {
+                           return std::string(tested.param) == "--real-time" ? "RealTime" : "Deterministic";
                          });
 
 }  // namespace

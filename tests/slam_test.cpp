@@ -73,7 +73,7 @@ INSTANTIATE_TEST_SUITE_P(
     Slam, RealSequence,
     testing::Values(std::make_tuple(std::string("fr1_rpy"), std::string("tum-fr1"), 0.026),
                     std::make_tuple(std::string("kitchen"), std::string("7scenes"), 0.052)),
-    [](const auto& info) { return std::get<0>(info.param); });
+    [](const auto& tested) { return std::get<0>(tested.param); });
 
 // Frames rendered beforehand, so that they come as fast as a camera's.
 class RecordedSource : public FrameSource {
