@@ -88,13 +88,15 @@ std::optional<Camera> camera_preset(std::string_view name) {
 }
 
 Camera read_camera(const std::filesystem::path& file) {
+  if (std::filesystem::is_directory(file))
+    throw InputError(file.string() + ": is a folder; give a YAML file");
   YAML::Node node;
   try {
     node = YAML::LoadFile(file.string());
   } catch (const YAML::BadFile&) {
     throw InputError(file.string() + ": cannot open the camera file; give a YAML file or a preset (" +
                      joined(camera_preset_names()) + ")");
-  } catch (const std::exception& error) {  // of YAML, or of the stream where the file is a folder
+  } catch (const std::exception& error) {
     throw InputError(file.string() + ": not a valid YAML file: " + error.what());
   }
   if (!node.IsMap()) throw InputError(file.string() + ": a camera file holds 'key: value' lines");

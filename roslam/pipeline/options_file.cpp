@@ -66,13 +66,15 @@ void reject_unknown_keys(const std::filesystem::path& file, const YAML::Node& ro
 }  // namespace
 
 Options read_options(const std::filesystem::path& file) {
+  if (std::filesystem::is_directory(file))
+    throw InputError(file.string() + ": is a folder; give a YAML file");
   YAML::Node root;
   try {
     root = YAML::LoadFile(file.string());
   } catch (const YAML::BadFile&) {
     throw InputError(file.string() +
                      ": cannot open the configuration file; roslam run --print-config shows one");
-  } catch (const std::exception& error) {  // of YAML, or of the stream where the file is a folder
+  } catch (const std::exception& error) {
     throw InputError(file.string() + ": not a valid YAML file: " + error.what());
   }
   Options options;
