@@ -9,7 +9,7 @@ install(TARGETS roslam EXPORT roslamTargets
   INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 # The cost functions stay inside: they would make users of the headers need Ceres.
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/roslam DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-  FILES_MATCHING PATTERN "*.hpp" PATTERN "bundle_cost.hpp" EXCLUDE)
+  FILES_MATCHING PATTERN "*.hpp" PATTERN "bundle_cost.hpp" EXCLUDE PATTERN "yaml_file.hpp" EXCLUDE)
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/roslam)
 
 install(EXPORT roslamTargets NAMESPACE roslam:: DESTINATION ${ROSLAM_PACKAGE_DIR})

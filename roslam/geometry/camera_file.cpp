@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <yaml-cpp/yaml.h>
-
 #include <map>
 #include <set>
 
 #include "roslam/error.hpp"
 #include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/yaml_file.hpp"
 
 namespace roslam {
 
@@ -88,17 +87,8 @@ std::optional<Camera> camera_preset(std::string_view name) {
 }
 
 Camera read_camera(const std::filesystem::path& file) {
-  if (std::filesystem::is_directory(file))
-    throw InputError(file.string() + ": is a folder; give a YAML file");
-  YAML::Node node;
-  try {
-    node = YAML::LoadFile(file.string());
-  } catch (const YAML::BadFile&) {
-    throw InputError(file.string() + ": cannot open the camera file; give a YAML file or a preset (" +
-                     joined(camera_preset_names()) + ")");
-  } catch (const std::exception& error) {
-    throw InputError(file.string() + ": not a valid YAML file: " + error.what());
-  }
+  const YAML::Node node = load_yaml(file, "cannot open the camera file; give a YAML file or a preset (" +
+                                              joined(camera_preset_names()) + ")");
   if (!node.IsMap()) throw InputError(file.string() + ": a camera file holds 'key: value' lines");
   reject_unknown_keys(file, node);
   const CameraFile read(file, node);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "roslam/features/observed_frame.hpp"
+#include "roslam/geometry/reprojection.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "roslam/map/ids.hpp"
 
@@ -105,6 +106,12 @@ class Map {
 
   std::span<const float> scales() const { return scales_; }
   float scale(int level) const { return scales_[static_cast<std::size_t>(level)]; }
+
+  /// What a point of a view measures.
+  Measurement measurement(const ObservedFrame& view, std::uint32_t point,
+                          const MeasurementNoise& noise) const {
+    return Measurement::make(view.pixels[point], view.depths[point], scale(view.levels[point]), noise);
+  }
 
   /// Level at which a landmark would be found from that distance (metres).
   int predict_level(const Landmark& landmark, double distance) const;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "roslam/error.hpp"
+#include "roslam/mapping/landmark_fit.hpp"
 
 namespace roslam {
 
@@ -57,7 +58,9 @@ class Fuser {
       const int match = matcher_.find({predicted->pixel, radius, predicted->level - 1, predicted->level,
                                        predicted->depth, matcher_.options().strict_distance, false},
                                       landmark->descriptor, view, none_taken);
-      if (match < 0 || !fits(keyframe, static_cast<std::uint32_t>(match), *landmark)) continue;
+      if (match < 0 ||
+          !fits(map_, keyframe, static_cast<std::uint32_t>(match), landmark->position, camera_, noise_))
+        continue;
       merged += join(id, keyframe_id, static_cast<std::uint32_t>(match)) ? 1 : 0;
     }
     return merged;
@@ -67,15 +70,6 @@ class Fuser {
   static bool sees(KeyframeId keyframe, const Landmark& landmark) {
     return std::any_of(landmark.observations.begin(), landmark.observations.end(),
                        [&](const Observation& o) { return o.keyframe == keyframe; });
-  }
-
-  bool fits(const Keyframe& keyframe, std::uint32_t point, const Landmark& landmark) const {
-    const ObservedFrame& view = *keyframe.view;
-    const Measurement measurement =
-        Measurement::make(view.pixels[point], view.depths[point], map_.scale(view.levels[point]), noise_);
-    const Eigen::Vector3d in_camera = keyframe.T_camera_world * landmark.position;
-    return ReprojectionError{camera_, measurement}.error(in_camera).squaredNorm() <=
-           outlier_limit(measurement);
   }
 
   // True if two landmarks became one.

@@ -102,9 +102,8 @@ LocalBundle LocalBundle::around(const Map& map, KeyframeId keyframe, const Measu
       if (pose_of[observation.keyframe.index()] < 0) add_pose(observation.keyframe, true);
       const ObservedFrame& view = *map.find(observation.keyframe)->view;
       const std::uint32_t i = observation.point;
-      local.problem.terms.push_back(
-          {static_cast<std::size_t>(pose_of[observation.keyframe.index()]), p,
-           Measurement::make(view.pixels[i], view.depths[i], map.scale(view.levels[i]), noise)});
+      local.problem.terms.push_back({static_cast<std::size_t>(pose_of[observation.keyframe.index()]), p,
+                                     map.measurement(view, i, noise)});
     }
   }
   return local;

@@ -6,24 +6,11 @@
 #include <numbers>
 
 #include "roslam/error.hpp"
+#include "roslam/mapping/landmark_fit.hpp"
 
 namespace roslam {
 
 namespace {
-Measurement measurement_of(const Map& map, const Keyframe& keyframe, std::uint32_t point,
-                           const MeasurementNoise& noise) {
-  const ObservedFrame& view = *keyframe.view;
-  return Measurement::make(view.pixels[point], view.depths[point], map.scale(view.levels[point]), noise);
-}
-
-bool fits(const Map& map, const Keyframe& keyframe, std::uint32_t point, const Eigen::Vector3d& position,
-          const Camera& camera, const MeasurementNoise& noise) {
-  const Eigen::Vector3d in_camera = keyframe.T_camera_world * position;
-  if (in_camera.z() <= 0.0) return false;
-  const Measurement measurement = measurement_of(map, keyframe, point, noise);
-  return ReprojectionError{camera, measurement}.error(in_camera).squaredNorm() <= outlier_limit(measurement);
-}
-
 // Points of a keyframe that show no landmark.
 std::vector<std::uint32_t> free_points(const Keyframe& keyframe) {
   std::vector<std::uint32_t> result;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <yaml-cpp/yaml.h>
-
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "roslam/error.hpp"
+#include "roslam/geometry/yaml_file.hpp"
 #include "roslam/pipeline/options_fields.hpp"
 
 namespace roslam {
@@ -66,28 +65,18 @@ void reject_unknown_keys(const std::filesystem::path& file, const YAML::Node& ro
 }  // namespace
 
 Options read_options(const std::filesystem::path& file) {
-  if (std::filesystem::is_directory(file))
-    throw InputError(file.string() + ": is a folder; give a YAML file");
-  YAML::Node root;
-  try {
-    root = YAML::LoadFile(file.string());
-  } catch (const YAML::BadFile&) {
-    throw InputError(file.string() +
-                     ": cannot open the configuration file; roslam run --print-config shows one");
-  } catch (const std::exception& error) {
-    throw InputError(file.string() + ": not a valid YAML file: " + error.what());
-  }
+  const YAML::Node root =
+      load_yaml(file, "cannot open the configuration file; roslam run --print-config shows one");
   Options options;
   if (root.IsNull()) return options;
   if (!root.IsMap())
     throw InputError(file.string() + ": a configuration file holds sections of 'key: value' lines");
   reject_unknown_keys(file, root);
-  const YAML::Node& readable = root;  // so that asking for an absent section does not create it
   for_each_option(options, [&](const char* section, const char* key, auto& field) {
-    if (!readable[section] || !readable[section].IsMap() || !readable[section][key]) return;
+    if (!root[section] || !root[section].IsMap() || !root[section][key]) return;
     const std::string name = file.string() + ": '" + section + "." + key + "'";
     try {
-      field = readable[section][key].template as<std::decay_t<decltype(field)>>();
+      field = root[section][key].template as<std::decay_t<decltype(field)>>();
     } catch (const YAML::Exception&) {
       throw OptionsError(name + " has a value of the wrong type");
     }

@@ -2,7 +2,6 @@
 #include "roslam/tracking/tracker.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "roslam/error.hpp"
@@ -82,7 +81,7 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     ++frames_lost_;
     state_ = frames_lost_ <= settings_.tracker.recently_lost_frames ? TrackingState::kRecentlyLost
                                                                     : TrackingState::kLost;
-    velocity_age_ = -1.0;
+    velocity_.reset();
     frame.T_camera_world.reset();
     frame.inliers = 0;
     frame.landmarks.assign(frame.view->size(), {});
@@ -108,9 +107,8 @@ bool Tracker::follow(TrackedFrame& frame) {
   constexpr float kWider = 3.0F;
   // Where the motion is unknown, what lies near in the image may be the wrong thing: descriptors alone
   // decide.
-  const bool is_predictable = velocity_age_ >= 0.0;
-  const bool matched = (is_predictable && match_last_frame(frame, predicted, 1.0F)) ||
-                       match_reference(frame) || match_last_frame(frame, predicted, kWider);
+  const bool matched = (velocity_ && match_last_frame(frame, predicted, 1.0F)) || match_reference(frame) ||
+                       match_last_frame(frame, predicted, kWider);
   return matched && refine_with_local_map(frame);
 }
 
@@ -121,7 +119,7 @@ SE3 Tracker::last_pose() const {
 
 SE3 Tracker::predict_pose(double timestamp) const {
   const SE3 last = last_pose();
-  return velocity_age_ < 0.0 ? last : SE3::exp(velocity_ * (timestamp - last_.timestamp)) * last;
+  return velocity_ ? SE3::exp(*velocity_ * (timestamp - last_.timestamp)) * last : last;
 }
 
 bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor) {
@@ -212,8 +210,7 @@ bool Tracker::estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& 
   for (std::size_t k = 0; k < points.size(); ++k) {
     const std::uint32_t i = points[k];
     measurements[k].point_world = positions[k];
-    measurements[k].measurement =
-        Measurement::make(view.pixels[i], view.depths[i], map_.scale(view.levels[i]), settings_.noise);
+    measurements[k].measurement = map_.measurement(view, i, settings_.noise);
   }
   const OptimisedPose pose = optimise_pose(camera_, measurements, *frame.T_camera_world, settings_.pose);
   for (std::size_t k = 0; k < points.size(); ++k) {
@@ -225,22 +222,22 @@ bool Tracker::estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& 
   return pose.inliers >= min_inliers;
 }
 
-void Tracker::match_local_landmarks(TrackedFrame& frame, const std::vector<LandmarkId>& landmarks,
-                                    double radius_factor) {
+void Tracker::match_local_landmarks(TrackedFrame& frame) {
   std::vector<bool> is_matched(map_.landmark_slots(), false);
   for (const LandmarkId id : frame.landmarks) {
     if (id.is_valid()) is_matched[id.index()] = true;
   }
   constexpr float kFrontal =
       0.998F;  // seen from almost the same direction, a landmark is searched for more closely
-  for (const LandmarkId id : landmarks) {
+  for (const LandmarkId id : local_map_.landmarks()) {
     if (is_matched[id.index()]) continue;
     Landmark& landmark = *map_.find(id);
     const auto predicted = predict(landmark, map_, *frame.view, camera_, *frame.T_camera_world);
     if (!predicted) continue;
     ++landmark.predicted;
     const float closeness = predicted->view_cosine > kFrontal ? 2.5F : 4.0F;
-    const float radius = closeness * static_cast<float>(radius_factor) * map_.scale(predicted->level);
+    const float radius =
+        closeness * static_cast<float>(settings_.matcher.map_radius) * map_.scale(predicted->level);
     const int match = matcher_.find({predicted->pixel, radius, predicted->level - 1, predicted->level + 1,
                                      predicted->depth, settings_.matcher.max_distance, true},
                                     landmark.descriptor, *frame.view, frame.landmarks);
@@ -252,7 +249,7 @@ bool Tracker::refine_with_local_map(TrackedFrame& frame) {
   const Stopwatch watch;
   local_map_.update(map_, frame.landmarks, last_.reference);
   frame.reference = local_map_.reference();
-  match_local_landmarks(frame, local_map_.landmarks(), settings_.matcher.map_radius);
+  match_local_landmarks(frame);
   times_.match_map += watch.seconds();
   std::vector<Eigen::Vector3d> positions;
   std::vector<std::uint32_t> points;
@@ -272,7 +269,7 @@ bool Tracker::relocalise(TrackedFrame& frame) {
   if (!found) return false;
   frame.T_camera_world = found->T_camera_world;
   frame.landmarks = found->landmarks;
-  velocity_age_ = -1.0;
+  velocity_.reset();
   last_.reference = found->keyframe;
   // A wrong place must not be taken for the right one: the local map has to confirm it twice as strongly.
   return refine_with_local_map(frame) && frame.inliers >= 2 * settings_.tracker.min_inliers;
@@ -292,9 +289,8 @@ void Tracker::remember(const TrackedFrame& frame) {
   constexpr double kMaxGap = 0.5;  // seconds; after a longer gap the old motion tells nothing
   if (last_.view != nullptr && elapsed > 0.0 && elapsed < kMaxGap) {
     velocity_ = (*frame.T_camera_world * last_pose().inverse()).log() / elapsed;
-    velocity_age_ = frame.timestamp;
   } else {
-    velocity_age_ = -1.0;
+    velocity_.reset();
   }
   last_ = frame;
   T_last_reference_ = *frame.T_camera_world * map_.T_camera_world(frame.reference).inverse();

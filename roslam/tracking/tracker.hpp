@@ -93,8 +93,7 @@ class Tracker {
                 const std::vector<std::uint32_t>& points, int min_inliers);
   bool first_estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
                       const std::vector<std::uint32_t>& points);
-  void match_local_landmarks(TrackedFrame& frame, const std::vector<LandmarkId>& landmarks,
-                             double radius_factor);
+  void match_local_landmarks(TrackedFrame& frame);
   void count_predictions(const TrackedFrame& frame);
   SE3 predict_pose(double timestamp) const;
   SE3 last_pose() const;
@@ -108,10 +107,9 @@ class Tracker {
   Relocaliser relocaliser_;
 
   TrackingState state_ = TrackingState::kInitialising;
-  TrackedFrame last_;     // the last frame with a pose
-  SE3 T_last_reference_;  // its pose in its reference keyframe, which bundle adjustment may move
-  Vector6d velocity_ = Vector6d::Zero();  // twist of T_current_last, per second
-  double velocity_age_ = -1.0;            // time of the frame velocity_ was measured at; negative = unknown
+  TrackedFrame last_;                 // the last frame with a pose
+  SE3 T_last_reference_;              // its pose in its reference keyframe, which bundle adjustment may move
+  std::optional<Vector6d> velocity_;  // twist of T_current_last, per second; none: unknown
   int frames_lost_ = 0;
   Times times_;
 };
