@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checkpoints that a crash cannot damage, and a moving average of the weights."""
+import copy
+import os
+from pathlib import Path
+
+import torch
+
+from training.segmentation import networks
+from training.segmentation.datasets import DataError
+
+
+def save(file, content):
+    """Writes to a temporary name and renames: the old checkpoint stays until the new one is whole."""
+    file = Path(file)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    temporary = file.with_suffix(".tmp")
+    torch.save(content, temporary)
+    os.replace(temporary, file)
+
+
+def load(file):
+    try:
+        return torch.load(file, map_location="cpu")
+    except FileNotFoundError:
+        raise DataError(f"{file}: no such checkpoint") from None
+    except Exception as error:
+        raise DataError(f"{file}: not a readable checkpoint ({type(error).__name__})") from error
+
+
+def load_network(file):
+    """The averaged network of a checkpoint, in evaluation mode."""
+    content = load(file)
+    network = networks.PSPNet(networks.NetworkOptions(**content["network_options"]))
+    network.load_state_dict(content["average"])
+    return network.eval()
+
+
+class Average:
+    """Exponential moving average of a network's weights and normalisation statistics."""
+
+    def __init__(self, network, decay):
+        self.decay = decay
+        self.network = copy.deepcopy(network).eval()
+        for parameter in self.network.parameters():
+            parameter.requires_grad_(False)
+
+    @torch.no_grad()
+    def update(self, network, step):
+        decay = min(self.decay, (1 + step) / (10 + step))  # forgets the random start quickly
+        for mine, theirs in zip(self.network.state_dict().values(), network.state_dict().values()):
+            if mine.dtype.is_floating_point:
+                mine.lerp_(theirs.detach().to(mine.dtype), 1 - decay)
+            else:
+                mine.copy_(theirs)

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The loss of the paper (section 3.2, eqs. 1-10), for labels that are sets of classes (label_set.py).
+
+Scores are N x classes x h x w, labels N x h x w numbers of sets, VOID where nothing is known.
+"""
+from dataclasses import dataclass
+
+import torch
+from torch.nn import functional
+
+from training.segmentation import label_set
+
+IMPOSSIBLE = -1e4  # log of a probability that counts as zero
+
+
+@dataclass(frozen=True)
+class LossOptions:
+    """form: "cross-entropy" (eq. 2) or "squared-hinge" (eqs. 9-10). auxiliary: weight of each auxiliary head.
+    by_class: split the auxiliary loss by class, weighted by the classes' shares alpha (eq. 1); otherwise it is the mean
+    over pixels. floor: gamma, below which the auxiliary loss of a class does not train any more (eq. 6).
+    head_decay: factor of the squared norms of the output weights (eqs. 4 and 6). balance: c in the class weights
+    1 / log(c + share) of the main loss; 0 = all equal."""
+
+    form: str = "cross-entropy"
+    auxiliary: float = 0.4
+    by_class: bool = False
+    floor: float = 0.0
+    head_decay: float = 0.0
+    balance: float = 1.1
+
+    def validate(self):
+        if self.form not in ("cross-entropy", "squared-hinge"):
+            raise ValueError("form must be cross-entropy or squared-hinge")
+        if min(self.auxiliary, self.floor, self.head_decay) < 0:
+            raise ValueError("auxiliary, floor and head_decay must not be negative")
+
+
+def labels_at(labels, size):
+    """Labels at a coarser size: the pixel at the centre of each cell."""
+    height, width = labels.shape[1:]
+    rows = torch.div((2 * torch.arange(size[0], device=labels.device) + 1) * height, 2 * size[0], rounding_mode="floor")
+    columns = torch.div((2 * torch.arange(size[1], device=labels.device) + 1) * width, 2 * size[1], rounding_mode="floor")
+    return labels[:, rows][:, :, columns]
+
+
+class PixelLoss(torch.nn.Module):
+    """Loss of each pixel against a set of classes, zero where void: N x h x w."""
+
+    def __init__(self, form="cross-entropy"):
+        super().__init__()
+        self.form = form
+        table = torch.from_numpy(label_set.membership())
+        void = torch.ones(256 - len(table), table.shape[1])
+        self.register_buffer("members", torch.cat([table, void]), persistent=False)
+
+    def forward(self, scores, labels):
+        members = self.members[labels.long()].permute(0, 3, 1, 2)
+        inside = scores + (1 - members) * IMPOSSIBLE
+        if self.form == "cross-entropy":  # eq. 2: -log of the probability of the set
+            return torch.logsumexp(scores, 1) - torch.logsumexp(inside, 1)
+        # Eqs. 9-10: every class outside the set should score 1 less than the best inside.
+        best = inside.max(1, keepdim=True).values
+        return (functional.relu(1 - (best - scores)) ** 2 * (1 - members)).sum(1)
+
+
+def class_weights(shares, balance):
+    """One weight a label set, by its share of the pixels, with mean 1 over the pixels."""
+    shares = torch.as_tensor(shares, dtype=torch.float32)
+    if balance == 0:
+        return torch.ones_like(shares)
+    weights = 1 / torch.log(balance + shares)
+    return weights / (weights * shares).sum()
+
+
+class DeepSupervision(torch.nn.Module):
+    """Eq. 1 in the form of eq. 8: main loss of the output and auxiliary losses of hidden blocks.
+
+    shares: share of each label set among the training pixels (alpha)."""
+
+    def __init__(self, shares, options=LossOptions()):
+        super().__init__()
+        options.validate()
+        self.options = options
+        self.pixel_loss = PixelLoss(options.form)
+        shares = torch.as_tensor(shares, dtype=torch.float32)
+        extra = torch.zeros(256 - len(shares))
+        self.register_buffer("shares", torch.cat([shares, extra]), persistent=False)
+        self.register_buffer("weights", torch.cat([class_weights(shares, options.balance), extra]), persistent=False)
+
+    def main(self, scores, labels):
+        """Mean over the known pixels, weighted by class (L_p)."""
+        labels = labels_at(labels, scores.shape[2:])
+        weights = self.weights[labels.long()]
+        return (self.pixel_loss(scores, labels) * weights).sum() / weights.sum().clamp(min=1e-6)
+
+    def hidden(self, scores, labels):
+        """L_a of one auxiliary head, less the floor."""
+        labels = labels_at(labels, scores.shape[2:])
+        losses = self.pixel_loss(scores, labels)
+        if not self.options.by_class:
+            known = (labels != label_set.VOID).sum().clamp(min=1)
+            return functional.relu(losses.sum() / known - self.options.floor)
+        flat = labels.reshape(-1).long()
+        zeros = losses.new_zeros(256)
+        means = zeros.scatter_add(0, flat, losses.reshape(-1)) / zeros.scatter_add(
+            0, flat, torch.ones_like(losses).reshape(-1)).clamp(min=1)
+        return (self.shares * functional.relu(means - self.options.floor)).sum()
+
+    def forward(self, outputs, labels, heads=()):
+        """outputs: (scores, auxiliary scores ...) as the network gives them in training. heads: the weights that
+        head_decay holds small."""
+        main, *hidden = (o.float() for o in outputs)
+        loss = self.main(main, labels)
+        if self.options.auxiliary:
+            loss = loss + self.options.auxiliary * sum(self.hidden(h, labels) for h in hidden)
+        if self.options.head_decay:
+            loss = loss + self.options.head_decay * sum((w ** 2).sum() for w in heads)
+        return loss

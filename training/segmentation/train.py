@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The training loop: one code path for a CPU, a GPU, or several processes started by torchrun."""
+import contextlib
+import dataclasses
+import json
+import os
+import platform
+import signal
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import torch
+from torch import distributed
+from torch.nn.parallel import DistributedDataParallel
+from torch.utils import data
+
+from training.segmentation import checkpoint, evaluation, losses, mixture, networks
+
+
+@dataclass(frozen=True)
+class TrainingOptions:
+    variant: str = "roslam-pspnet"  # of networks.variants()
+    steps: int = 20000  # of one batch each
+    batch: int = 16  # crops, over all processes
+    learning_rate: float = 2e-3  # after the warm-up
+    warm_up: int = 300  # steps
+    decay_share: float = 0.3  # last share of the steps, over which the rate falls to zero
+    weight_decay: float = 0.01
+    average: float = 0.999  # decay of the moving average of the weights, which is what ships
+    seed: int = 1
+    crop: int = 256  # pixels
+    workers: int = 1  # processes that make samples
+    save_every: int = 200  # steps
+    validate_every: int = 1000  # steps
+    precision: str = "auto"  # auto, float, half
+    only: tuple = ()  # names of datasets to train on; empty = all
+    loss: losses.LossOptions = field(default_factory=losses.LossOptions)
+
+    def validate(self):
+        if self.variant not in networks.variants():
+            raise ValueError(f"variant {self.variant}: one of {', '.join(networks.variants())}")
+        if min(self.steps, self.batch, self.crop) < 1 or not 0 < self.learning_rate < 1:
+            raise ValueError("steps, batch and crop must be positive, learning_rate between 0 and 1")
+        if self.crop % networks.SIZE_MULTIPLE:
+            raise ValueError(f"crop must be a multiple of {networks.SIZE_MULTIPLE} pixels")
+
+
+def rate_at(step, options):
+    """Warm-up, a plateau that later runs may lengthen, and a linear fall to zero."""
+    fall = max(round(options.decay_share * options.steps), 1)
+    return options.learning_rate * min((step + 1) / options.warm_up, 1, (options.steps - step) / fall)
+
+
+def half_precision(device, precision):
+    """A context that computes in half precision where that is asked for and pays."""
+    if precision == "float":
+        return contextlib.nullcontext()
+    if device.type == "cuda":
+        kind = torch.bfloat16 if torch.cuda.is_bf16_supported() else torch.float16
+        return torch.autocast("cuda", dtype=kind)
+    if precision == "half" or cpu_has_bfloat16():
+        return torch.autocast("cpu", dtype=torch.bfloat16)
+    return contextlib.nullcontext()
+
+
+def cpu_has_bfloat16():
+    """Without the instructions, half precision is emulated and slower."""
+    try:
+        return "avx512_bf16" in Path("/proc/cpuinfo").read_text()
+    except OSError:
+        return False
+
+
+def parameter_groups(network, weight_decay):
+    """No decay for biases, normalisation and depthwise filters, which have few weights and no excess to remove."""
+    decayed, free = [], []
+    for parameter in network.parameters():
+        (decayed if parameter.ndim == 4 and parameter.shape[1] > 1 else free).append(parameter)
+    return [{"params": decayed, "weight_decay": weight_decay}, {"params": free, "weight_decay": 0.0}]
+
+
+class Processes:
+    """The processes that train together: one, or as many as torchrun started."""
+
+    def __init__(self):
+        self.count = int(os.environ.get("WORLD_SIZE", 1))
+        self.rank = int(os.environ.get("RANK", 0))
+        local = int(os.environ.get("LOCAL_RANK", 0))
+        self.device = torch.device("cuda", local) if torch.cuda.is_available() else torch.device("cpu")
+        if self.count > 1:
+            distributed.init_process_group("nccl" if self.device.type == "cuda" else "gloo")
+
+    def wrap(self, network):
+        if self.count == 1:
+            return network
+        return DistributedDataParallel(network, [self.device.index] if self.device.type == "cuda" else None)
+
+    def close(self):
+        if self.count > 1:
+            distributed.destroy_process_group()
+
+
+def sample_loader(samples, first_step, options, processes):
+    """Batches from first_step on. Sample numbers depend on the step and the process alone."""
+    share = options.batch // processes.count
+    numbers = (step * options.batch + processes.rank * share + i
+               for step in range(first_step, options.steps) for i in range(share))
+    return data.DataLoader(samples, batch_size=share, sampler=_Numbers(numbers, (options.steps - first_step) * share),
+                           num_workers=options.workers, drop_last=True, pin_memory=processes.device.type == "cuda",
+                           worker_init_fn=_single_threaded)
+
+
+class _Numbers(data.Sampler):
+    def __init__(self, numbers, count):
+        self.numbers, self.count = numbers, count
+
+    def __iter__(self):
+        return self.numbers
+
+    def __len__(self):
+        return self.count
+
+
+def _single_threaded(_):
+    import cv2
+
+    cv2.setNumThreads(1)
+    torch.set_num_threads(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the main process decides when to stop
+
+
+class Log:
+    """Appends JSON lines to a file and prints them short; silent in all processes but the first."""
+
+    def __init__(self, file, is_first):
+        self.file = file if is_first else None
+
+    def write(self, **entry):
+        if self.file:
+            with open(self.file, "a", encoding="utf-8") as out:
+                out.write(json.dumps(entry) + "\n")
+            print(" ".join(f"{k} {v:.5g}" if isinstance(v, float) else f"{k} {v}" for k, v in entry.items()), flush=True)
+
+
+class Trainer:
+    """Everything a run holds: made anew or from the checkpoint in its folder."""
+
+    def __init__(self, data_folder, out, options, cityscapes=None, start_from=None):
+        options.validate()
+        self.options, self.out = options, Path(out)
+        self.processes = Processes()
+        self.out.mkdir(parents=True, exist_ok=True)
+        self.log = Log(self.out / "log.jsonl", self.processes.rank == 0)
+        sets, people = mixture.training_sets(data_folder, cityscapes, options.only)
+        crops = dataclasses.replace(mixture.augmentation.AugmentationOptions(), crop=options.crop)
+        self.samples = mixture.Mixture(sets, people, options.seed, crops)
+        self.validation = mixture.validation_sets(data_folder) if self.processes.rank == 0 else []
+        torch.manual_seed(options.seed)
+        network = networks.PSPNet(networks.variants()[options.variant])
+        self.network = network.to(self.processes.device, memory_format=torch.channels_last)
+        self.shares = mixture.set_shares(self.samples)
+        self.loss = losses.DeepSupervision(self.shares, options.loss).to(self.processes.device)
+        self.optimiser = torch.optim.AdamW(parameter_groups(self.network, options.weight_decay), options.learning_rate)
+        self.average = checkpoint.Average(self.network, options.average)
+        self.scaler = torch.cuda.amp.GradScaler(
+            enabled=self.processes.device.type == "cuda" and not torch.cuda.is_bf16_supported())
+        self.step = 0
+        self.stopped = False
+        if (self.out / "last.pt").exists():
+            self.restore(checkpoint.load(self.out / "last.pt"))
+        elif start_from:
+            self.network.load_state_dict(checkpoint.load(start_from)["average"])
+            self.average = checkpoint.Average(self.network, options.average)
+
+    def restore(self, content):
+        self.network.load_state_dict(content["network"])
+        self.average.network.load_state_dict(content["average"])
+        self.optimiser.load_state_dict(content["optimiser"])
+        self.step = content["step"]
+
+    def save(self, name="last.pt"):
+        if self.processes.rank == 0:
+            checkpoint.save(self.out / name, {
+                "network": self.network.state_dict(), "average": self.average.network.state_dict(),
+                "optimiser": self.optimiser.state_dict(), "step": self.step,
+                "network_options": dataclasses.asdict(self.network.options),
+                "training_options": dataclasses.asdict(self.options)})
+
+    def validate(self):
+        if not self.validation:
+            return
+        result = {}
+        for data_set, groups in self.validation:
+            scored = evaluation.score(self.average.network, data_set, groups)
+            result[data_set.name] = scored["classes"]["person"] if groups is mixture.label_set.PERSON1 else scored["mean"]
+            if data_set.name == "cityscapes256":
+                result["car"] = scored["classes"]["car"]
+        self.log.write(step=self.step, **{f"iou_{k}": round(v, 4) for k, v in result.items()})
+
+    def train_step(self, network, pictures, labels):
+        options, device = self.options, self.processes.device
+        rate = rate_at(self.step, options)
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate
+        images = pictures.to(device, non_blocking=True).permute(0, 3, 1, 2).float().div(255)
+        images = images.contiguous(memory_format=torch.channels_last)
+        with half_precision(device, options.precision):
+            outputs = network(images)
+        loss = self.loss(outputs, labels.to(device, non_blocking=True), self.head_weights())
+        self.optimiser.zero_grad(set_to_none=True)
+        self.scaler.scale(loss).backward()
+        self.scaler.unscale_(self.optimiser)
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
+        self.scaler.step(self.optimiser)
+        self.scaler.update()
+        self.average.update(self.network, self.step)
+        self.step += 1
+        return float(loss.detach()), rate
+
+    def head_weights(self):
+        return [self.network.classifier.weight, self.network.auxiliary4[-1].weight, self.network.auxiliary5[-1].weight]
+
+    def run(self):
+        """Trains to the last step. Ctrl-C or a termination request saves and stops; the same call goes on."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: setattr(self, "stopped", True))
+        self.log.write(event="start", step=self.step, variant=self.options.variant, device=str(self.processes.device),
+                       processes=self.processes.count, host=platform.machine(), torch=torch.__version__)
+        network = self.processes.wrap(self.network).train()
+        begin, losses_since = time.monotonic(), []
+        for pictures, labels in sample_loader(self.samples, self.step, self.options, self.processes):
+            loss, rate = self.train_step(network, pictures, labels)
+            losses_since.append(loss)
+            if self.step % 50 == 0:
+                self.log.write(step=self.step, loss=sum(losses_since) / len(losses_since), rate=rate,
+                               seconds=(time.monotonic() - begin) / len(losses_since))
+                begin, losses_since = time.monotonic(), []
+            is_last = self.stopped or self.step == self.options.steps
+            if is_last or self.step % self.options.save_every == 0:
+                self.save()
+            if self.step % self.options.validate_every == 0 or self.step == self.options.steps:
+                self.validate()
+                begin = time.monotonic()
+            if self.stopped:
+                break
+        self.log.write(event="stopped" if self.step < self.options.steps else "end", step=self.step)
+        self.processes.close()
