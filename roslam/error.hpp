@@ -30,6 +30,12 @@ class OptionsError : public Error {
   using Error::Error;
 };
 
+/// A network that is missing, damaged or not the one expected.
+class ModelError : public Error {
+ public:
+  using Error::Error;
+};
+
 /// A result that could not be written: folder not writable, disk full.
 class OutputError : public Error {
  public:

@@ -51,6 +51,12 @@ ImageFile read_depth_image(const std::filesystem::path& file) {
   return read;
 }
 
+ImageFile read_label_image(const std::filesystem::path& file) {
+  ImageFile read = read_image(file, cv::IMREAD_UNCHANGED);
+  if (read.error.empty() && read.image.type() != CV_8UC1) return {{}, "is not an 8-bit grey image"};
+  return read;
+}
+
 cv::Mat depth_to_metres(const cv::Mat& raw, double units_per_metre) {
   cv::Mat metres;
   raw.convertTo(metres, CV_32FC1, 1.0 / units_per_metre);

@@ -20,6 +20,9 @@ ImageFile read_colour_image(const std::filesystem::path& file);
 /// Reads a 16-bit single-channel image as CV_16UC1.
 ImageFile read_depth_image(const std::filesystem::path& file);
 
+/// Reads an image of labels, 8 bit and one channel, as CV_8UC1.
+ImageFile read_label_image(const std::filesystem::path& file);
+
 /// Raw depth units to CV_32FC1 metres; 0 stays 0 (unknown).
 cv::Mat depth_to_metres(const cv::Mat& raw, double units_per_metre);
 

@@ -113,6 +113,8 @@ void TumOptions::validate() const {
   }
 }
 
+std::vector<TimedFile> read_tum_list(const std::filesystem::path& file) { return read_list(file).entries; }
+
 std::vector<int> associate(const std::vector<TimedFile>& colour, const std::vector<TimedFile>& depth,
                            double max_time_difference) {
   struct Pair {

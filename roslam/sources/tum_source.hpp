@@ -23,6 +23,10 @@ struct TimedFile {
   std::filesystem::path file;  ///< relative to the dataset folder
 };
 
+/// The files that an rgb.txt or depth.txt names, as listed; lines whose time is no number are left out. Throws
+/// InputError if the file is missing, malformed or names no image.
+std::vector<TimedFile> read_tum_list(const std::filesystem::path& file);
+
 /// Pairs each colour image with the depth image nearest in time; each depth image serves once. The result
 /// holds an index into depth or -1, one for each colour image. Both lists must be sorted by time.
 std::vector<int> associate(const std::vector<TimedFile>& colour, const std::vector<TimedFile>& depth,

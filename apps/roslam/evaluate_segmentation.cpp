@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "apps/roslam/evaluate.hpp"
+#include "roslam/error.hpp"
+#include "roslam/evaluation/segmentation_error.hpp"
+
+namespace roslam::app {
+
+namespace {
+struct Arguments {
+  std::string truth;
+  std::string estimate;
+  std::string classes = "cityscapes19";
+  std::string truth_classes;
+  std::string estimate_classes;
+  bool json = false;
+};
+
+void run(const Arguments& arguments) {
+  const LabelSet set = *label_set_from(arguments.classes);
+  const SegmentationError error = evaluate_segmentation(arguments.truth, arguments.estimate, set,
+                                                        arguments.truth_classes, arguments.estimate_classes);
+  std::cout << (arguments.json ? to_json(error, set.name) : to_markdown(error)) << std::flush;
+  if (!std::cout)
+    throw OutputError("stdout: the report cannot be written in full; check the disk or the pipe");
+}
+}  // namespace
+
+void add_evaluate_segmentation_command(CLI::App& evaluate) {
+  auto* command = evaluate.add_subcommand("segmentation", "Compare label images with the true ones.");
+  const auto arguments = std::make_shared<Arguments>();
+  const CLI::IsMember known(label_set_names());
+  command
+      ->add_option("--truth", arguments->truth,
+                   "Folder of true label images (PNG), or one that holds it as labels/")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--estimate", arguments->estimate, "Folder of label images of the same names")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--classes", arguments->classes, "Classes to score")
+      ->check(known)
+      ->capture_default_str();
+  command
+      ->add_option("--truth-classes", arguments->truth_classes,
+                   "What the true labels are, if not told by themselves")
+      ->check(known);
+  command
+      ->add_option("--estimate-classes", arguments->estimate_classes,
+                   "What the labels are, if not told by themselves")
+      ->check(known);
+  command->add_flag("--json", arguments->json, "Print one JSON object instead of a table");
+  command->footer(
+      "Example, labels of 19 classes scored in eight groups:\n"
+      "  roslam segment val/images --out labels\n"
+      "  roslam evaluate segmentation --truth val/labels --estimate labels --classes groups8\n"
+      "What the labels of a folder mean is told by labels.json in it (roslam segment writes it), else by "
+      "their values:\n"
+      "labels of the 19 Cityscapes classes are recognised and grouped. For --classes person any value but 0 "
+      "is one.");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace roslam::app

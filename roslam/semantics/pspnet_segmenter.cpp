@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/semantics/pspnet_segmenter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/dnn.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <system_error>
+
+#include "roslam/error.hpp"
+#include "roslam/geometry/stopwatch.hpp"
+#include "roslam/semantics/score_labels.hpp"
+
+namespace roslam {
+
+namespace {
+constexpr int kSizeMultiple = 32;  // what the sides the network sees are multiples of
+
+cv::Mat as_bgr(const cv::Mat& image) {
+  if (image.empty()) throw InputError("segmentation needs a picture, this one is empty");
+  cv::Mat bgr;
+  switch (image.type()) {
+    case CV_8UC3:
+      return image;
+    case CV_8UC4:
+      cv::cvtColor(image, bgr, cv::COLOR_BGRA2BGR);
+      return bgr;
+    case CV_8UC1:
+      cv::cvtColor(image, bgr, cv::COLOR_GRAY2BGR);
+      return bgr;
+    default:
+      throw InputError("segmentation needs an 8-bit picture with 1, 3 or 4 channels");
+  }
+}
+}  // namespace
+
+void SegmenterOptions::validate() const {
+  if (working_side < kSizeMultiple || working_side > 4096) {
+    throw OptionsError("segmenter.working_side must be 32 to 4096 pixels");
+  }
+}
+
+cv::Size working_size(const cv::Size& image, int working_side) {
+  const double scale = static_cast<double>(working_side) / std::max(image.width, image.height);
+  const auto side = [&](int pixels) {
+    return std::max(kSizeMultiple, kSizeMultiple * static_cast<int>(pixels * scale / kSizeMultiple + 0.5));
+  };
+  return {side(image.width), side(image.height)};
+}
+
+PspnetSegmenter::PspnetSegmenter(const std::filesystem::path& model, const SegmenterOptions& options,
+                                 InferenceBackend backend)
+    : model_(model), options_(options) {
+  options_.validate();
+  inference_ = load_inference(model, backend);
+  const int size[] = {1, 3, 2 * kSizeMultiple,
+                      2 * kSizeMultiple};  // a first look: has it the shape we expect?
+  scores_for(cv::Mat(4, size, CV_32F, cv::Scalar(0)));
+}
+
+cv::Mat PspnetSegmenter::scores_for(const cv::Mat& blob) {
+  const cv::Mat scores = inference_->run(blob);
+  const bool has_shape = scores.dims == 4 && scores.type() == CV_32F && scores.size[0] == 1;
+  if (!has_shape || scores.size[1] != kClasses) {
+    throw ModelError(model_.string() + ": gives " +
+                     (has_shape ? std::to_string(scores.size[1]) + " classes" : "no class scores") +
+                     " where the " + std::to_string(kClasses) +
+                     " of Cityscapes are expected; install the model that belongs to this version");
+  }
+  if (scores.size[2] < 1 || scores.size[2] > blob.size[2] || scores.size[3] < 1 ||
+      scores.size[3] > blob.size[3]) {
+    throw ModelError(model_.string() +
+                     ": gives scores of another shape than its picture; install the model that "
+                     "belongs to this version");
+  }
+  return scores;
+}
+
+Segmentation PspnetSegmenter::segment(const cv::Mat& image) {
+  const Stopwatch watch;
+  const cv::Mat bgr = as_bgr(image);
+  const cv::Size size = working_size(bgr.size(), options_.working_side);
+  cv::Mat seen;
+  cv::resize(bgr, seen, size, 0, 0, size.area() < bgr.size().area() ? cv::INTER_AREA : cv::INTER_LINEAR);
+  const cv::Mat blob = cv::dnn::blobFromImage(seen, 1.0 / 255.0, {}, {}, true);
+  Segmentation result = labels_from_scores(scores_for(blob), bgr.size());
+  result.seconds = watch.seconds();
+  return result;
+}
+
+std::filesystem::path shipped_segmentation_model() {
+  constexpr auto kName = "roslam-pspnet.onnx";
+  std::error_code error;
+  const auto folder = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+  for (const char* models :
+       {"models", "../models", "../../models", "../../../models", "../share/roslam/models"}) {
+    const auto file = folder / models / kName;
+    if (std::filesystem::is_regular_file(file, error)) return file.lexically_normal();
+  }
+  return {};
+}
+
+}  // namespace roslam

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/sources/picture_source.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdio>
+#include <opencv2/videoio.hpp>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "roslam/error.hpp"
+#include "roslam/sources/image_file.hpp"
+#include "roslam/sources/tum_source.hpp"
+
+namespace roslam {
+
+namespace {
+namespace fs = std::filesystem;
+
+bool has_ending(const fs::path& file, const auto& endings) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return std::find(endings.begin(), endings.end(), ending) != endings.end();
+}
+
+bool is_picture(const fs::path& file) {
+  constexpr std::array<std::string_view, 9> kEndings{".png",  ".jpg",  ".jpeg", ".bmp", ".tif",
+                                                     ".tiff", ".webp", ".ppm",  ".pgm"};
+  return has_ending(file, kEndings);
+}
+
+bool is_video(const fs::path& file) {
+  constexpr std::array<std::string_view, 8> kEndings{".mp4",  ".avi", ".mkv", ".mov",
+                                                     ".webm", ".m4v", ".mpg", ".mjpg"};
+  return has_ending(file, kEndings);
+}
+
+std::vector<fs::path> picture_files(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.is_regular_file(error) && is_picture(entry.path())) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+class PictureFiles : public PictureSource {
+ public:
+  explicit PictureFiles(std::vector<fs::path> files) : files_(std::move(files)) {}
+
+  std::optional<Picture> next() override {
+    while (position_ < files_.size()) {
+      const fs::path& file = files_[position_++];
+      ImageFile read = read_colour_image(file);
+      if (read.error.empty()) return Picture{file.stem().string(), read.image};
+      ++skipped_["picture " + read.error];
+    }
+    return std::nullopt;
+  }
+
+  std::optional<std::size_t> size() const override { return files_.size(); }
+  const std::map<std::string, std::size_t>& skipped() const override { return skipped_; }
+
+ private:
+  std::vector<fs::path> files_;
+  std::size_t position_ = 0;
+  std::map<std::string, std::size_t> skipped_;
+};
+
+class VideoPictures : public PictureSource {
+ public:
+  explicit VideoPictures(const fs::path& file) : video_(file.string()) {
+    if (!video_.isOpened()) {
+      throw InputError(file.string() +
+                       ": is no video that can be decoded; convert it to MP4 (H.264) or to pictures");
+    }
+  }
+
+  std::optional<Picture> next() override {
+    cv::Mat image;
+    if (!video_.read(image)) return std::nullopt;
+    char name[16];
+    std::snprintf(name, sizeof(name), "%06zu", frames_++);
+    return Picture{name, image};
+  }
+
+  std::optional<std::size_t> size() const override {
+    const double count = video_.get(cv::CAP_PROP_FRAME_COUNT);
+    if (count < 1.0) return std::nullopt;
+    return static_cast<std::size_t>(count);
+  }
+
+  const std::map<std::string, std::size_t>& skipped() const override { return skipped_; }
+
+ private:
+  cv::VideoCapture video_;
+  std::size_t frames_ = 0;
+  std::map<std::string, std::size_t> skipped_;
+};
+
+// Results are named after the pictures: one would replace the other.
+void reject_equal_names(const std::vector<fs::path>& files) {
+  std::map<std::string, fs::path> seen;
+  for (const auto& file : files) {
+    const auto [other, is_new] = seen.emplace(file.stem().string(), file);
+    if (!is_new) {
+      throw InputError(file.string() + ": has the same name as " + other->second.string() +
+                       "; label them in separate calls");
+    }
+  }
+}
+}  // namespace
+
+std::vector<fs::path> pictures_in(const fs::path& folder) {
+  if (TumSource::recognises(folder)) {
+    std::vector<fs::path> files;
+    for (const auto& entry : read_tum_list(folder / "rgb.txt")) files.push_back(folder / entry.file);
+    return files;
+  }
+  for (const auto& place : {folder, folder / "images", folder / "rgb"}) {
+    if (auto files = picture_files(place); !files.empty()) return files;
+  }
+  throw InputError(folder.string() +
+                   ": holds no pictures (PNG, JPEG, BMP, TIFF, WebP) and is no TUM RGB-D folder");
+}
+
+std::unique_ptr<PictureSource> open_pictures(const std::vector<fs::path>& inputs) {
+  std::vector<fs::path> files;
+  for (const auto& input : inputs) {
+    std::error_code error;
+    if (fs::is_directory(input, error)) {
+      const auto found = pictures_in(input);
+      files.insert(files.end(), found.begin(), found.end());
+    } else if (!fs::exists(input, error)) {
+      throw InputError(input.string() + ": no such picture, folder or video");
+    } else if (is_video(input)) {
+      if (inputs.size() > 1) throw InputError(input.string() + ": a video must be given alone");
+      return std::make_unique<VideoPictures>(input);
+    } else {
+      files.push_back(input);
+    }
+  }
+  reject_equal_names(files);
+  return std::make_unique<PictureFiles>(std::move(files));
+}
+
+}  // namespace roslam

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes a trained network as an ONNX file that OpenCV 4.5 and later, and ONNX Runtime, can run."""
+import copy
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from torch import nn
+from torch.nn.utils.fusion import fuse_conv_bn_eval
+
+from training.segmentation.evaluation import WORKING_SIDE
+from training.segmentation.networks import SIZE_MULTIPLE
+
+OPSET = 11  # the newest that OpenCV 4.6 reads in full
+TOLERANCE = 1e-3  # largest difference of scores between PyTorch and OpenCV, relative to the largest score
+
+
+def folded(network):
+    """A copy whose normalisations are part of the convolutions before them: fewer layers, the same scores."""
+    network = copy.deepcopy(network).eval()
+    for parent in list(network.modules()):
+        if isinstance(parent, nn.Sequential) and len(parent) > 1 and isinstance(parent[1], nn.BatchNorm2d):
+            parent[0] = fuse_conv_bn_eval(parent[0], parent[1])
+            parent[1] = nn.Identity()
+    return network
+
+
+def export(network, file, size=(3 * SIZE_MULTIPLE * 3, WORKING_SIDE)):
+    """Writes the network and checks that OpenCV computes the same scores. size: height and width the file is traced
+    with; with a pyramid of any-size windows it runs at every multiple of SIZE_MULTIPLE all the same. (Sizes left open in
+    the file would be more honest, but OpenCV 4.6 cannot read those.)"""
+    file = Path(file)
+    network = folded(network).to("cpu")
+    picture = torch.rand(1, 3, *size, generator=torch.Generator().manual_seed(1))
+    temporary = file.with_suffix(".tmp")
+    with torch.no_grad():
+        torch.onnx.export(network, picture, str(temporary), opset_version=OPSET, input_names=["image"],
+                          output_names=["scores"])
+        check(network, temporary, picture)
+        if network.options.pyramid != "bins":
+            check(network, temporary, picture[:, :, :SIZE_MULTIPLE * 2, :SIZE_MULTIPLE * 5])
+    os.replace(temporary, file)
+
+
+def check(network, file, picture):
+    runner = cv2.dnn.readNetFromONNX(str(file))
+    runner.setInput(picture.numpy())
+    scores, expected = runner.forward(), network(picture).numpy()
+    difference = np.abs(scores - expected).max() / np.abs(expected).max()
+    if difference > TOLERANCE:
+        raise RuntimeError(f"{file}: OpenCV's scores differ from PyTorch's by {difference:.1e} of the largest")
