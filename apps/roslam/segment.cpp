@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <array>
-#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -49,7 +49,7 @@ struct Findings {
   std::array<double, kClasses> confidences{};  // weighted by area
   std::vector<double> milliseconds;
 
-  void add(const Segmentation& segmentation, double wall_seconds) {
+  void add(const Segmentation& segmentation) {
     ++pictures;
     pixels += static_cast<double>(segmentation.labels.total());
     std::array<double, kClasses> counts{};
@@ -61,7 +61,7 @@ struct Findings {
       areas[c] += counts[c];
       confidences[c] += counts[c] * static_cast<double>(segmentation.confidence[c]);
     }
-    milliseconds.push_back(1000.0 * wall_seconds);
+    milliseconds.push_back(1000.0 * segmentation.seconds);
   }
 
   double share(std::size_t c) const { return areas[c] / pixels; }
@@ -112,7 +112,7 @@ Json summary_json(const SegmentArguments& arguments, const fs::path& model, cons
   Json json{{"classes", arguments.classes}, {"out", arguments.out.string()},
             {"model", model.string()},      {"working_side", arguments.options.working_side},
             {"pictures", found.pictures},   {"interrupted", interrupted},
-            {"skipped", source.skipped()},  {"median_ms", median(found.milliseconds)},
+            {"skipped", source.skipped()},  {"processor_milliseconds", median(found.milliseconds)},
             {"by_class", Json::object()}};
   for (std::size_t c = 0; c < kClasses; ++c) {
     json["by_class"][std::string(class_name(static_cast<int>(c)))] = {{"share", found.share(c)},
@@ -131,7 +131,7 @@ void print_summary(const SegmentArguments& arguments, const Findings& found, con
   }
   std::cout << markdown_table(rows) << "\n";
   std::cout << "labelled " << found.pictures << " pictures, median " << fixed(median(found.milliseconds), 1)
-            << " ms a picture from image to labels\n";
+            << " ms of processor time from image to labels\n";
   for (const auto& [reason, count] : source.skipped())
     std::cout << "skipped " << count << ": " << reason << "\n";
   std::cout << "results: " << arguments.out.string() << "\n";
@@ -144,9 +144,8 @@ Findings label_all(const SegmentArguments& arguments, const LabelSet& set, Pictu
   while (!stop.stop_requested()) {
     const auto picture = source.next();
     if (!picture) break;
-    const auto start = std::chrono::steady_clock::now();
     const Segmentation segmentation = segmenter.segment(picture->image);
-    found.add(segmentation, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    found.add(segmentation);
     write_picture(arguments.out / (picture->name + ".png"), relabel(segmentation.labels, set));
     if (arguments.overlay) {
       write_picture(arguments.out / "overlay" / (picture->name + ".jpg"),
@@ -159,6 +158,7 @@ Findings label_all(const SegmentArguments& arguments, const LabelSet& set, Pictu
 
 void segment(const SegmentArguments& arguments) {
   cv::setNumThreads(arguments.threads);
+  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // FFmpeg's own lines say less than ours
   const InterruptWatcher interrupt;
   const LabelSet set = *label_set_from(arguments.classes);
   const fs::path model = model_of(arguments);

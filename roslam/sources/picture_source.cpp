@@ -73,7 +73,7 @@ class PictureFiles : public PictureSource {
 
 class VideoPictures : public PictureSource {
  public:
-  explicit VideoPictures(const fs::path& file) : video_(file.string()) {
+  explicit VideoPictures(const fs::path& file) : video_(file.string(), cv::CAP_FFMPEG) {
     if (!video_.isOpened()) {
       throw InputError(file.string() +
                        ": is no video that can be decoded; convert it to MP4 (H.264) or to pictures");

@@ -14,7 +14,7 @@ from training.segmentation import label_set
 @dataclass(frozen=True)
 class AugmentationOptions:
     crop: int = 256  # pixels, side of the square crop
-    zoom: tuple = (0.75, 1.8)  # size of the picture's shorter side in crops
+    zoom: tuple = (0.9, 2.0)  # size of the picture's shorter side in crops
     stretch: tuple = (0.85, 1.2)  # width against height
     roll: float = 8.0  # degrees to each side
     paste: float = 0.25  # probability that people are pasted in

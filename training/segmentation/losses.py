@@ -26,7 +26,7 @@ class LossOptions:
     by_class: bool = False
     floor: float = 0.0
     head_decay: float = 0.0
-    balance: float = 1.1
+    balance: float = 1.05
 
     def validate(self):
         if self.form not in ("cross-entropy", "squared-hinge"):

@@ -3,7 +3,7 @@
 
 Every variant is a `NetworkOptions`; `VARIANTS` names them in the order of the ablation, from the printed network to
 the one that ships. Images are N x 3 x H x W, RGB from 0 to 1; scores are N x classes x H/4 x W/4 with the decoder and
-N x classes x H/8 x W/8 without.
+N x classes x H/8 x W/8 without; sub-pixel scores double that.
 """
 from dataclasses import dataclass, replace
 
@@ -25,6 +25,7 @@ class NetworkOptions:
     classes: int = 19
     stem_width: int = 8  # channels of block 1
     stride4_width: int = 0  # channels of a separable convolution in place of block 2's pooling; 0 = pooling
+    stride4_units: int = 0  # bottlenecks after it
     widths: tuple = (64, 128, 256)  # outer channels of blocks 3, 4, 5
     narrow: tuple = (16, 32, 64)  # inner channels of their bottlenecks
     units: tuple = (4, 8, 4)  # bottlenecks in each
@@ -34,6 +35,7 @@ class NetworkOptions:
     head: str = "full"  # 3x3 convolution that joins the pyramid: "full" or "separable"
     head_width: int = 128
     decoder: bool = False  # joins features of strides 8 and 4
+    sub_pixel: bool = False  # 2x2 scores a cell: twice the resolution for the price of channels
 
     def validate(self):
         if self.block5_stride not in (8, 16, 32):
@@ -52,7 +54,8 @@ def variants():
     any_size = replace(separable, pyramid="any-size")
     stem = replace(any_size, stem_width=16, stride4_width=32)
     decoder = replace(stem, decoder=True)
-    wide = replace(decoder, narrow=(32, 64, 128), head_width=96)
+    sub_pixel = replace(decoder, stride4_units=1, sub_pixel=True)
+    wide = replace(sub_pixel, narrow=(32, 64, 128), head_width=96)
     return {
         "table2": table2,
         "table2-plain-pool": replace(table2, pyramid="none"),
@@ -61,6 +64,7 @@ def variants():
         "any-size-pyramid": any_size,
         "wide-stem": stem,
         "decoder": decoder,
+        "sub-pixel": sub_pixel,
         "roslam-pspnet": wide,
     }
 
@@ -173,7 +177,9 @@ class PSPNet(nn.Module):
         stem = options.stem_width
         self.block1 = conv(3, stem, 3, 2)
         if options.stride4_width:
-            self.block2 = separable(stem, options.stride4_width, 2)
+            width = options.stride4_width
+            self.block2 = nn.Sequential(separable(stem, width, 2),
+                                        *(Bottleneck(width, width // 2, width) for _ in range(options.stride4_units)))
         else:
             self.block2 = nn.MaxPool2d(3, 2, 1)
         width4 = options.stride4_width or stem
@@ -196,7 +202,11 @@ class PSPNet(nn.Module):
             self.refine8 = separable(options.head_width, options.head_width // 2)
             self.join4 = conv(width4, options.head_width // 2, relu=False)
             self.refine4 = separable(options.head_width // 2, options.head_width // 2)
-        self.classifier = nn.Conv2d(options.head_width // 2 if options.decoder else options.head_width, options.classes, 1)
+        last = options.head_width // 2 if options.decoder else options.head_width
+        if options.sub_pixel:  # the transposed form of a pixel shuffle, which exports for every size
+            self.classifier = nn.ConvTranspose2d(last, options.classes, 2, 2)
+        else:
+            self.classifier = nn.Conv2d(last, options.classes, 1)
         self.auxiliary4 = nn.Sequential(separable(w4, 64), nn.Conv2d(64, options.classes, 1))
         self.auxiliary5 = nn.Sequential(separable(w5, 64), nn.Conv2d(64, options.classes, 1))
         self.register_buffer("mean", torch.tensor(IMAGE_MEAN).view(1, 3, 1, 1), persistent=False)
@@ -222,6 +232,14 @@ def upsample(x, factor):
     if factor == 1:
         return x
     return functional.interpolate(x, scale_factor=float(factor), mode="bilinear", align_corners=False)
+
+
+def load_matching(network, weights):
+    """Takes over the weights that have a place of the same name and shape; returns how many did not."""
+    mine = network.state_dict()
+    taken = {name: w for name, w in weights.items() if name in mine and mine[name].shape == w.shape}
+    network.load_state_dict(taken, strict=False)
+    return len(mine) - len(taken)
 
 
 def parameters_in_inference(network):

@@ -170,7 +170,8 @@ class Trainer:
         if (self.out / "last.pt").exists():
             self.restore(checkpoint.load(self.out / "last.pt"))
         elif start_from:
-            self.network.load_state_dict(checkpoint.load(start_from)["average"])
+            missing = networks.load_matching(self.network, checkpoint.load(start_from)["average"])
+            self.log.write(event="weights taken over", of=str(start_from), new=missing)
             self.average = checkpoint.Average(self.network, options.average)
 
     def restore(self, content):
