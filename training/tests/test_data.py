@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import os
+import tempfile
+import unittest
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from training.segmentation import augmentation, datasets, label_set, mixture
+
+SHARED = Path(os.environ.get("ROSLAM_TEST_DATA", "../shared/data"))
+
+
+class LabelSets(unittest.TestCase):
+    def test_every_grouping_covers_each_class_at_most_once(self):
+        for groups in (label_set.GROUPS8, label_set.CAMVID11, label_set.PERSON1):
+            members = [c for classes in groups.values() for c in classes]
+            self.assertEqual(sorted(members), list(range(19)))
+
+    def test_lookups_say_void_where_nothing_is_known(self):
+        self.assertEqual(label_set.FROM_TRAIN_IDS[18], 18)
+        self.assertEqual(label_set.FROM_TRAIN_IDS[255], label_set.VOID)
+        self.assertEqual(label_set.FROM_CAMVID[11], label_set.VOID)
+        self.assertEqual(label_set.SETS[label_set.FROM_CAMVID[5]], (8, 9))
+        self.assertEqual(label_set.SETS[label_set.FROM_PERSON_MASK[255]], (11, 12))
+        self.assertEqual(label_set.FROM_CITYSCAPES_IDS[24], 11)
+        self.assertEqual(label_set.FROM_CITYSCAPES_IDS[0], label_set.VOID)
+
+    def test_movable_groups_are_the_movable_classes(self):
+        members = sorted(c for classes in label_set.MOVABLE_GROUPS.values() for c in classes)
+        self.assertEqual(tuple(members), label_set.MOVABLE)
+
+
+def one_picture_set(name="rooms"):
+    rng = np.random.default_rng(1)
+    labels = np.zeros((120, 160), np.uint8)
+    labels[:, 80:] = 2
+    picture = np.zeros((120, 160, 3), np.uint8)
+    picture[:, 80:] = 200
+    picture += rng.integers(0, 20, picture.shape, np.uint8)
+    return datasets.LabelledPictures(name, [picture], [labels])
+
+
+def red_person():
+    mask = np.zeros((90, 30), np.uint8)
+    mask[5:85, 8:22] = 255
+    return np.full((90, 30, 3), (255, 0, 0), np.uint8), mask
+
+
+class Samples(unittest.TestCase):
+    def setUp(self):
+        self.samples = mixture.Mixture([one_picture_set()], [red_person()], 3)
+
+    def test_a_sample_depends_on_seed_and_number_alone(self):
+        again = mixture.Mixture([one_picture_set()], [red_person()], 3)
+        again[7]
+        for number in (5, 0, 5):
+            self.assertTrue(all(np.array_equal(a, b) for a, b in zip(self.samples[number], again[number])))
+        other = mixture.Mixture([one_picture_set()], [red_person()], 4)
+        self.assertFalse(np.array_equal(self.samples[0][0], other[0][0]))
+
+    def test_crops_have_the_size_and_known_labels(self):
+        for number in range(20):
+            picture, labels = self.samples[number]
+            self.assertEqual((picture.shape, labels.shape), ((256, 256, 3), (256, 256)))
+            self.assertTrue(set(np.unique(labels)) <= {0, 2, 11, label_set.VOID})
+
+    def test_labels_follow_the_picture(self):
+        plain = augmentation.AugmentationOptions(roll=5)
+        data = one_picture_set()
+        for seed in range(10):
+            picture, labels = augmentation.crop(np.random.default_rng(seed), *data[0], plain)
+            bright = picture.mean(2) > 110
+            known = labels != label_set.VOID
+            wrong = (bright != (labels == 2)) & known
+            self.assertLess(wrong.mean(), 0.02)
+
+    def test_a_pasted_person_is_labelled_where_it_is_seen(self):
+        options = augmentation.AugmentationOptions(hide=0)
+        for seed in range(10):
+            picture = np.zeros((256, 256, 3), np.uint8)
+            labels = np.zeros((256, 256), np.uint8)
+            augmentation.paste_person(np.random.default_rng(seed), picture, labels, *red_person(), options)
+            red = picture[..., 0] > 70
+            self.assertLess((red != (labels == 11)).mean(), 0.02)
+
+
+class Readers(unittest.TestCase):
+    def test_the_official_layout_of_cityscapes(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for part in ("leftImg8bit", "gtFine"):
+                (Path(folder) / part / "train/bonn").mkdir(parents=True)
+            stem = "bonn_000000_000019"
+            cv2.imwrite(f"{folder}/leftImg8bit/train/bonn/{stem}_leftImg8bit.png", np.zeros((64, 128, 3), np.uint8))
+            cv2.imwrite(f"{folder}/gtFine/train/bonn/{stem}_gtFine_labelIds.png", np.full((64, 128), 26, np.uint8))
+            data = datasets.cityscapes(folder, "train")
+            self.assertEqual(len(data), 1)
+            self.assertEqual(np.unique(data[0][1]).tolist(), [13])
+
+    def test_what_is_missing_is_named(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with self.assertRaisesRegex(datasets.DataError, "camvid"):
+                datasets.camvid(folder, "train")
+            images = Path(folder) / "segmentation/camvid/val/images"
+            images.mkdir(parents=True)
+            cv2.imwrite(str(images / "a.png"), np.zeros((8, 8, 3), np.uint8))
+            with self.assertRaisesRegex(datasets.DataError, "labels/a.png"):
+                datasets.camvid(folder, "val")
+            (images / "a.png").write_bytes(b"no picture")
+            with self.assertRaisesRegex(datasets.DataError, "a.png: missing or not a picture"):
+                datasets.camvid(folder, "val")
+
+    def test_held_back_people_are_in_no_training_set(self):
+        items = list(range(12))
+        train, val = datasets.held_back(items, False), datasets.held_back(items, True)
+        self.assertEqual(val, [4, 9])
+        self.assertEqual(sorted(train + val), items)
+
+    @unittest.skipUnless((SHARED / "segmentation/coco128").exists(), "no data at hand")
+    def test_coco_polygons_become_movable_classes(self):
+        data = datasets.coco128(SHARED)
+        seen = set()
+        for labels in data.labels:
+            seen |= set(np.unique(labels))
+        self.assertTrue({13, 18, label_set.set_number(label_set.PERSON), label_set.set_number(label_set.STATIC)} <= seen)
+
+
+if __name__ == "__main__":
+    unittest.main()

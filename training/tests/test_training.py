@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import dataclasses
+import json
+import os
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+from unittest import mock
+
+import cv2
+import numpy as np
+import torch
+
+from training.segmentation import checkpoint, evaluation, export, label_set, losses, mixture, networks, train
+from training.tests.test_data import one_picture_set, red_person
+
+PROGRAM = os.environ.get("ROSLAM_PROGRAM", "")
+
+
+def random_network(variant="roslam-pspnet"):
+    """Untrained, but with no two weights alike and normalisations that do something."""
+    torch.manual_seed(3)
+    network = networks.PSPNet(networks.variants()[variant])
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.add_(torch.randn_like(parameter) * 0.05)
+        for name, buffer in network.named_buffers():
+            if name.endswith("running_var"):
+                buffer.uniform_(0.5, 1.5)
+    return network.eval()
+
+
+class Networks(unittest.TestCase):
+    def test_shapes_of_every_variant(self):
+        for name, options in networks.variants().items():
+            network = networks.PSPNet(options)
+            scores = network.eval()(torch.zeros(1, 3, 96, 128))
+            side = (2 if options.sub_pixel else 4) if options.decoder else 8
+            self.assertEqual(scores.shape, (1, 19, 96 // side, 128 // side), name)
+            main, block4, block5 = network.train()(torch.zeros(2, 3, 96, 128))
+            self.assertEqual(block4.shape[2:], (12, 16), name)
+            self.assertEqual(block5.shape[2], 96 // options.block5_stride, name)
+
+    def test_table2_has_33_depthwise_layers_with_the_printed_widths(self):
+        network = networks.PSPNet(networks.variants()["table2"])
+        blocks = (network.block3, network.block4, network.block5)
+        depthwise = [m for b in blocks for m in b.modules()
+                     if isinstance(m, torch.nn.Conv2d) and m.groups == m.in_channels > 1]
+        self.assertEqual(len(depthwise), 2 * (4 + 8 + 4))  # and block 1 makes 33
+        self.assertEqual([b[-1].layers[-1][0].out_channels for b in blocks], [64, 128, 256])
+        self.assertEqual([b[-1].layers[1][0].out_channels for b in blocks], [16, 32, 64])
+
+    def test_the_shipped_variant_is_small(self):
+        network = networks.PSPNet(networks.variants()["roslam-pspnet"])
+        self.assertLess(networks.parameters_in_inference(network), 1.5e6)
+
+    def test_absurd_options_are_refused(self):
+        with self.assertRaisesRegex(ValueError, "block5_stride"):
+            networks.PSPNet(networks.NetworkOptions(block5_stride=4))
+        with self.assertRaisesRegex(ValueError, "variant"):
+            train.TrainingOptions(variant="resnet").validate()
+
+
+class Export(unittest.TestCase):
+    def test_folding_and_opencv_keep_the_scores_at_every_size(self):
+        network = random_network()
+        with tempfile.TemporaryDirectory() as folder:
+            export.export(network, Path(folder) / "net.onnx")
+            runner = cv2.dnn.readNetFromONNX(f"{folder}/net.onnx")
+            for size in ((32, 32), (96, 160), (288, 384)):
+                picture = torch.rand(1, 3, *size)
+                runner.setInput(picture.numpy())
+                expected = network(picture).detach().numpy()
+                np.testing.assert_allclose(runner.forward(), expected, atol=1e-4 * np.abs(expected).max())
+
+    def test_a_pyramid_of_bins_exports_for_one_size(self):
+        with tempfile.TemporaryDirectory() as folder:
+            export.export(random_network("table2"), Path(folder) / "net.onnx")
+            self.assertEqual(os.listdir(folder), ["net.onnx"])
+
+
+class Scores(unittest.TestCase):
+    def test_confusion_and_iou_by_hand(self):
+        truth = np.array([0, 0, 0, 1, 1, 255], np.uint8)
+        labels = np.array([0, 0, 1, 1, 9, 0], np.uint8)
+        values = evaluation.iou(evaluation.confusion(truth, labels, 3))
+        np.testing.assert_allclose(values, [2 / 3, 1 / 3, np.nan])
+
+    def test_sets_that_span_groups_are_not_scored(self):
+        table = evaluation.truth_table(label_set.GROUPS8)
+        self.assertEqual(table[label_set.set_number(label_set.PERSON)], 5)
+        self.assertEqual(table[label_set.set_number(label_set.STATIC)], label_set.VOID)
+        self.assertEqual(table[label_set.set_number((8, 9))], 3)
+
+    def test_working_size(self):
+        self.assertEqual(evaluation.working_size(480, 640, 384), (288, 384))
+        self.assertEqual(evaluation.working_size(1, 7680, 384), (32, 384))
+
+
+class Schedule(unittest.TestCase):
+    def test_rises_stays_and_falls_to_zero(self):
+        options = train.TrainingOptions(steps=1000, warm_up=100, decay_share=0.2, learning_rate=0.01)
+        self.assertAlmostEqual(train.rate_at(49, options), 0.005)
+        self.assertAlmostEqual(train.rate_at(500, options), 0.01)
+        self.assertAlmostEqual(train.rate_at(900, options), 0.005)
+        self.assertLess(train.rate_at(999, options), 1e-4)
+
+
+class Training(unittest.TestCase):
+    """Tiny runs on one made-up picture."""
+
+    def trainer(self, folder, steps):
+        options = train.TrainingOptions(variant="wide-stem", steps=steps, batch=2, crop=64, workers=0, warm_up=2,
+                                        save_every=3, validate_every=1000, precision="float", average=0.5,
+                                        loss=losses.LossOptions())
+        with mock.patch.object(mixture, "training_sets", lambda *_: ([one_picture_set()], [red_person()])), \
+                mock.patch.object(mixture, "validation_sets", lambda *_: []):
+            return train.Trainer("", folder, options)
+
+    def test_loss_falls(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.trainer(folder, 100).run()
+            entries = [json.loads(line) for line in (Path(folder) / "log.jsonl").read_text().splitlines()]
+            values = [e["loss"] for e in entries if "loss" in e]
+            self.assertLess(values[-1], 0.7 * values[0])
+            network = checkpoint.load_network(Path(folder) / "last.pt")
+            scored = evaluation.score(network, one_picture_set(), label_set.GROUPS8, 160)
+            self.assertGreater(scored["classes"]["flat"], 0.5)
+
+    def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(self):
+        with tempfile.TemporaryDirectory() as whole, tempfile.TemporaryDirectory() as parts:
+            self.trainer(whole, 8).run()
+            first = self.trainer(parts, 8)
+            step = first.train_step
+
+            def stop_after_five(*batch):
+                first.stopped = first.step == 4
+                return step(*batch)
+
+            first.train_step = stop_after_five
+            first.run()
+            self.assertEqual(first.step, 5)
+            second = self.trainer(parts, 8)
+            self.assertEqual(second.step, 5)
+            second.run()
+            a = checkpoint.load(Path(whole) / "last.pt")["network"]
+            b = checkpoint.load(Path(parts) / "last.pt")["network"]
+            for name in a:
+                torch.testing.assert_close(a[name], b[name], rtol=1e-4, atol=1e-5)
+
+    def test_damaged_checkpoints_are_named(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "last.pt"
+            file.write_bytes(b"no checkpoint")
+            with self.assertRaisesRegex(checkpoint.DataError, "last.pt"):
+                self.trainer(folder, 1)
+            with self.assertRaisesRegex(checkpoint.DataError, "none.pt: no such"):
+                checkpoint.load(Path(folder) / "none.pt")
+
+
+@unittest.skipUnless(os.path.exists(PROGRAM), "the program is not built")
+class Program(unittest.TestCase):
+    """The C++ program against this code."""
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.root = Path(self.folder.name)
+
+    def run_program(self, *arguments):
+        return subprocess.run([PROGRAM, *map(str, arguments)], check=True, capture_output=True, text=True).stdout
+
+    def pictures(self):
+        rng = np.random.default_rng(2)
+        for i, size in enumerate(((480, 640), (256, 256), (360, 480), (100, 333), (720, 1280))):
+            coarse = rng.integers(0, 256, (size[0] // 30 + 2, size[1] // 30 + 2, 3), np.uint8)
+            yield f"{i}", cv2.resize(coarse, size[::-1], interpolation=cv2.INTER_CUBIC)
+
+    def test_labels_are_those_of_pytorch(self):
+        network = random_network()
+        export.export(network, self.root / "net.onnx")
+        (self.root / "in").mkdir()
+        pictures = dict(self.pictures())
+        for name, picture in pictures.items():
+            cv2.imwrite(str(self.root / "in" / f"{name}.png"), picture)
+        self.run_program("segment", self.root / "in", "--out", self.root / "out", "--model", self.root / "net.onnx")
+        equal, total = 0, 0
+        for name, picture in pictures.items():
+            expected = evaluation.predict(network, picture[..., ::-1].copy())
+            labels = cv2.imread(str(self.root / "out" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
+            self.assertGreater(len(np.unique(expected)), 2)  # or the comparison would say nothing
+            equal += (labels == expected).sum()
+            total += labels.size
+        self.assertGreaterEqual(equal / total, 0.995)
+
+    def test_scores_are_those_of_this_code(self):
+        rng = np.random.default_rng(4)
+        classes = len(label_set.GROUPS8)
+        counts = np.zeros((classes, classes + 1), np.int64)
+        for part in ("truth", "labels"):
+            (self.root / part).mkdir()
+        for i in range(3):
+            truth, labels = (rng.choice([0, 2, 5, 11, 13, 18, 255], (40, 50)).astype(np.uint8) for _ in range(2))
+            labels = np.where(rng.random((40, 50)) < 0.6, truth, labels)
+            cv2.imwrite(str(self.root / "truth" / f"{i}.png"), truth)
+            cv2.imwrite(str(self.root / "labels" / f"{i}.png"), labels)
+            table = label_set.grouping(label_set.GROUPS8)
+            counts += evaluation.confusion(table[truth], table[labels], classes)
+        values = evaluation.iou(counts)
+        report = json.loads(self.run_program("evaluate", "segmentation", "--truth", self.root / "truth", "--estimate",
+                                             self.root / "labels", "--classes", "groups8", "--json"))
+        self.assertAlmostEqual(report["mean_iou"], float(np.nanmean(values)), places=9)
+        for name, value in zip(label_set.GROUPS8, values):
+            found = report["by_class"][name]["iou"]
+            self.assertTrue(found is None if np.isnan(value) else abs(found - value) < 1e-9, name)
+
+
+if __name__ == "__main__":
+    unittest.main()
