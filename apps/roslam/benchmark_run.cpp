@@ -16,7 +16,8 @@ namespace fs = std::filesystem;
 
 std::vector<std::string> run_arguments(const BenchmarkSequence& sequence, const BenchmarkSettings& settings,
                                        const fs::path& out) {
-  std::vector<std::string> arguments{"run", sequence.source, "--out", out.string(), "--quiet"};
+  std::vector<std::string> arguments{"run",     sequence.source, "--out", out.string(),
+                                     "--quiet", "--dynamic",     "none"};
   const auto add = [&](const std::string& option, const std::string& value) {
     arguments.push_back(option);
     arguments.push_back(value);

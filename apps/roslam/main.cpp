@@ -3,6 +3,7 @@
 #include <exception>
 #include <iostream>
 #include <new>
+#include <opencv2/core/utility.hpp>
 #include <string>
 
 #include "apps/roslam/commands.hpp"
@@ -21,6 +22,9 @@ std::string one_line(std::string text) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Stages run side by side on threads of their own and are told their cost in processor time: threads within
+  // OpenCV would neither help the first nor show in the second.
+  cv::setNumThreads(1);
   CLI::App program("RO-SLAM: visual SLAM for drones that fly where things move.");
   program.require_subcommand(1);
   program.set_version_flag("--version", ROSLAM_VERSION);

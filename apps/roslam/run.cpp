@@ -15,6 +15,7 @@
 #include "roslam/pipeline/run.hpp"
 #include "roslam/pipeline/run_folder.hpp"
 #include "roslam/pipeline/slam.hpp"
+#include "roslam/semantics/pspnet_segmenter.hpp"
 
 namespace roslam::app {
 
@@ -25,6 +26,7 @@ struct RunArguments {
   std::string config;
   bool deterministic = false;
   bool real_time = false;
+  std::string dynamic;  // none or labels; empty: labels where the mode and the installation allow it
   bool print_config = false;
   bool quiet = false;
   bool json = false;
@@ -52,6 +54,26 @@ void require_poses(const Slam& slam, const RunSummary& summary, const FrameSourc
   throw InputError(name + ": no frame could be tracked" + reasons + "; tracking starts at an image with " +
                    std::to_string(slam.options().tracker.min_initial_points) +
                    " corners of known depth: check the images and depth_units_per_metre of the camera");
+}
+
+// The network that finds what may move; null where nothing is to be removed.
+std::unique_ptr<PspnetSegmenter> open_segmenter(const RunArguments& arguments, const Options& options,
+                                                std::string& model) {
+  if (arguments.dynamic == "none") return nullptr;
+  const bool is_asked_for = arguments.dynamic == "labels";
+  const auto shipped = shipped_segmentation_model();
+  if (!shipped.empty() && (is_asked_for || !arguments.real_time)) {
+    model = shipped.string();
+    return std::make_unique<PspnetSegmenter>(shipped, options.segmenter);
+  }
+  if (is_asked_for) {
+    throw ModelError(
+        "models/roslam-pspnet.onnx: not found beside the program, and --dynamic labels needs it");
+  }
+  std::cerr << (shipped.empty() ? "note: models/roslam-pspnet.onnx not found beside the program: "
+                                : "note: real-time mode without --dynamic labels: ")
+            << "points on things that move are not removed\n";
+  return nullptr;
 }
 
 void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder& folder) {
@@ -88,6 +110,8 @@ void execute(const RunArguments& arguments, const std::string& version) {
   const InterruptWatcher interrupt;
   const auto source = open_source(arguments.source);
   const RunFolder folder(arguments.out);
+  RunDescription description{arguments.source.name, arguments.source.camera, version, {}};
+  const auto segmenter = open_segmenter(arguments, options, description.segmentation_model);
   Slam slam(source->camera(), options, arguments.real_time ? Mode::kRealTime : Mode::kDeterministic);
   RunSummary summary;
   {
@@ -95,9 +119,8 @@ void execute(const RunArguments& arguments, const std::string& version) {
     summary = run(
         *source, slam,
         [&](const FrameResult& frame) { progress.show(frame.index + 1, name_of(frame.state)); },
-        interrupt.token());
+        interrupt.token(), segmenter.get());
   }
-  const RunDescription description{arguments.source.name, arguments.source.camera, version};
   folder.write(slam, summary, *source, description);
   if (summary.failure) std::rethrow_exception(summary.failure);
   require_poses(slam, summary, *source, arguments.source.name);
@@ -138,6 +161,12 @@ void add_run_command(CLI::App& program, const std::string& version) {
           "--real-time", arguments->real_time,
           "Stages on threads, frames at the pace of their timestamps; late frames are dropped and counted")
       ->excludes(deterministic);
+  command
+      ->add_option("--dynamic", arguments->dynamic,
+                   "How points on things that may move are removed: labels (by a network) or none. Default: "
+                   "labels, and "
+                   "none with --real-time, where the network would cost frames")
+      ->check(CLI::IsMember({"none", "labels"}));
   command->add_option("--traffic", arguments->source.traffic, "Of a simulated flight: none, light or heavy")
       ->check(CLI::IsMember({"none", "light", "heavy"}))
       ->capture_default_str();

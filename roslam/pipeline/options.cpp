@@ -15,6 +15,7 @@ void Options::validate() const {
   orb.validate();
   depth.validate();
   noise.validate();
+  segmenter.validate();
   matcher.validate();
   pose.validate();
   local_map.validate();

@@ -8,6 +8,7 @@
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/geometry/reprojection.hpp"
 #include "roslam/mapping/local_mapper.hpp"
+#include "roslam/semantics/pspnet_segmenter.hpp"
 #include "roslam/tracking/keyframe_policy.hpp"
 #include "roslam/tracking/tracker.hpp"
 
@@ -32,6 +33,7 @@ struct Options {
   OrbOptions orb;
   DepthOptions depth;
   MeasurementNoise noise;
+  SegmenterOptions segmenter;
   MatcherOptions matcher;
   PoseOptimiserOptions pose;
   LocalMapOptions local_map;

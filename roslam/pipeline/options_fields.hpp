@@ -22,6 +22,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("noise", "depth_sigma", o.noise.depth_sigma);
   visit("noise", "depth_sigma_growth", o.noise.depth_sigma_growth);
   visit("noise", "outlier_factor", o.noise.outlier_factor);
+  visit("segmenter", "working_side", o.segmenter.working_side);
   visit("matcher", "max_distance", o.matcher.max_distance);
   visit("matcher", "strict_distance", o.matcher.strict_distance);
   visit("matcher", "ratio", o.matcher.ratio);

@@ -51,15 +51,17 @@ class PixelLoss(torch.nn.Module):
         self.form = form
         table = torch.from_numpy(label_set.membership())
         void = torch.ones(256 - len(table), table.shape[1])
-        self.register_buffer("members", torch.cat([table, void]), persistent=False)
+        members = torch.cat([table, void])
+        self.register_buffer("members", members, persistent=False)
+        self.register_buffer("outside", (1 - members) * IMPOSSIBLE, persistent=False)
 
     def forward(self, scores, labels):
-        members = self.members[labels.long()].permute(0, 3, 1, 2)
-        inside = scores + (1 - members) * IMPOSSIBLE
+        inside = scores + self.outside[labels.long()].permute(0, 3, 1, 2)
         if self.form == "cross-entropy":  # eq. 2: -log of the probability of the set
             return torch.logsumexp(scores, 1) - torch.logsumexp(inside, 1)
         # Eqs. 9-10: every class outside the set should score 1 less than the best inside.
         best = inside.max(1, keepdim=True).values
+        members = self.members[labels.long()].permute(0, 3, 1, 2)
         return (functional.relu(1 - (best - scores)) ** 2 * (1 - members)).sum(1)
 
 
