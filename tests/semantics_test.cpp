@@ -9,6 +9,7 @@
 
 #include "roslam/error.hpp"
 #include "roslam/semantics/label_set.hpp"
+#include "roslam/semantics/onnx_picture_size.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
 #include "roslam/semantics/score_labels.hpp"
 #include "tests/program.hpp"
@@ -246,6 +247,22 @@ TEST(BadModel, TheOnnxRuntimeBackendIsMissedClearlyWhereItWasNotBuilt) {
   if (has_onnx_runtime()) GTEST_SKIP() << "this build has ONNX Runtime";
   const std::string reason = reason_to_refuse(test_model("colours.onnx"), InferenceBackend::kOnnxRuntime);
   EXPECT_NE(reason.find("no ONNX Runtime"), std::string::npos) << reason;
+}
+
+TEST(OnnxPictureSize, IsLeftOpenInPlaceAndNothingElseChanges) {
+  const std::string before = content(test_model("colours.onnx"));
+  const std::string after = with_open_picture_size(before);
+  ASSERT_EQ(after.size(), before.size());
+  // 288 and 384 of the input: two dimensions of three bytes each. Those of the output have one byte and stay.
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) changed += before[i] != after[i] ? 1U : 0U;
+  EXPECT_EQ(changed, 6U);
+  EXPECT_NE(after.find(std::string("\x12\x01h")), std::string::npos);
+  EXPECT_NE(after.find(std::string("\x12\x01i")), std::string::npos);
+  for (std::size_t length = 0; length < before.size(); length += 13) {
+    EXPECT_EQ(with_open_picture_size(before.substr(0, length)).size(), length);
+  }
+  EXPECT_EQ(with_open_picture_size("no network"), "no network");
 }
 
 TEST(OnnxRuntime, GivesTheLabelsOfOpenCv) {
