@@ -81,10 +81,9 @@ Segmentation PspnetSegmenter::segment(const cv::Mat& image) {
   const Stopwatch watch;
   const cv::Mat bgr = as_bgr(image);
   const cv::Size size = working_size(bgr.size(), options_.working_side);
-  cv::Mat seen;
-  cv::resize(bgr, seen, size, 0, 0, size.area() < bgr.size().area() ? cv::INTER_AREA : cv::INTER_LINEAR);
-  const cv::Mat blob = cv::dnn::blobFromImage(seen, 1.0 / 255.0, {}, {}, true);
-  Segmentation result = labels_from_scores(scores_for(blob), bgr.size());
+  cv::resize(bgr, seen_, size, 0, 0, size.area() < bgr.size().area() ? cv::INTER_AREA : cv::INTER_LINEAR);
+  cv::dnn::blobFromImage(seen_, blob_, 1.0 / 255.0, {}, {}, true);
+  Segmentation result = labels_from_scores(scores_for(blob_), bgr.size());
   result.seconds = watch.seconds();
   return result;
 }

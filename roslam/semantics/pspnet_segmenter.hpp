@@ -38,6 +38,8 @@ class PspnetSegmenter : public Segmenter {
   std::filesystem::path model_;
   SegmenterOptions options_;
   std::unique_ptr<Inference> inference_;
+  cv::Mat seen_;  // kept, as fetching fresh memory for each picture takes longer than filling it
+  cv::Mat blob_;
 };
 
 /// The weights that ship with the program: models/roslam-pspnet.onnx beside the program or its build folder,

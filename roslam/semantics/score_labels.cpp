@@ -2,7 +2,6 @@
 #include "roslam/semantics/score_labels.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <vector>
@@ -40,46 +39,61 @@ Row mixed(const Row& a, const Row& b, float weight) {
   return row;
 }
 
-// Scores by grid point, so that the classes of one point lie together.
+// The network's scores, a plane a class, with the best class of each grid point.
 struct Grid {
   int rows;
   int columns;
-  std::vector<Row> scores;
-  std::vector<std::uint8_t> best;
+  std::array<const float*, kClasses> planes{};
+  std::vector<float> highest;
+  std::vector<int> best;
 
-  explicit Grid(const cv::Mat& planes) : rows(planes.size[2]), columns(planes.size[3]) {
-    const std::size_t points = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
-    scores.resize(points);
-    best.resize(points);
-    for (int c = 0; c < kClasses; ++c) {
-      const float* plane = planes.ptr<float>(0, c);
-      for (std::size_t i = 0; i < points; ++i) scores[i][static_cast<std::size_t>(c)] = plane[i];
+  explicit Grid(const cv::Mat& scores)
+      : rows(scores.size[2]), columns(scores.size[3]), highest(points()), best(points(), 0) {
+    for (int c = 0; c < kClasses; ++c) planes[static_cast<std::size_t>(c)] = scores.ptr<float>(0, c);
+    std::copy_n(planes[0], points(), highest.begin());
+    for (int c = 1; c < kClasses; ++c) {
+      const float* plane = planes[static_cast<std::size_t>(c)];
+      for (std::size_t i = 0; i < points(); ++i) {
+        const bool is_better = plane[i] > highest[i];
+        highest[i] = is_better ? plane[i] : highest[i];
+        best[i] = is_better ? c : best[i];
+      }
     }
-    for (std::size_t i = 0; i < points; ++i) best[i] = static_cast<std::uint8_t>(best_of(scores[i]));
   }
+
+  std::size_t points() const { return static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns); }
 
   std::size_t at(int row, int column) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
            static_cast<std::size_t>(column);
   }
+
+  // Between two points of a column, one below the other.
+  Row scores_between(std::size_t above, std::size_t below, float weight) const {
+    Row row;
+    for (std::size_t c = 0; c < kClasses; ++c) {
+      row[c] = planes[c][above] + (planes[c][below] - planes[c][above]) * weight;
+    }
+    return row;
+  }
 };
 
-// Probability of the best class: its share in the softmax.
-float probability(const Row& scores, int best) {
-  float sum = 0.0F;
-  for (const float score : scores) {
-    const float difference = score - scores[static_cast<std::size_t>(best)];
-    if (difference > -12.0F) sum += std::exp(difference);
-  }
-  return 1.0F / sum;
-}
-
+// The probability of a point's best class is its share in the softmax.
 std::array<float, kClasses> mean_probabilities(const Grid& grid) {
+  const cv::Mat highest(1, static_cast<int>(grid.points()), CV_32F, const_cast<float*>(grid.highest.data()));
+  cv::Mat sum = cv::Mat::zeros(highest.size(), CV_32F);
+  cv::Mat share;
+  for (const float* plane : grid.planes) {
+    cv::subtract(cv::Mat(highest.size(), CV_32F, const_cast<float*>(plane)), highest, share);
+    cv::exp(share, share);
+    sum += share;
+  }
   std::array<double, kClasses> sums{};
   std::array<int, kClasses> counts{};
-  for (std::size_t i = 0; i < grid.best.size(); ++i) {
-    sums[grid.best[i]] += probability(grid.scores[i], grid.best[i]);
-    ++counts[grid.best[i]];
+  for (std::size_t i = 0; i < grid.points(); ++i) {
+    const auto c = static_cast<std::size_t>(grid.best[i]);
+    sums[c] += 1.0 / static_cast<double>(sum.at<float>(static_cast<int>(i)));
+    ++counts[c];
   }
   std::array<float, kClasses> means{};
   for (std::size_t c = 0; c < kClasses; ++c) {
@@ -94,13 +108,13 @@ void label_span(const Grid& grid, const Axis& across, int above, int below, floa
   const auto x = static_cast<std::size_t>(begin);
   const std::size_t corners[4] = {grid.at(above, across.first[x]), grid.at(above, across.second[x]),
                                   grid.at(below, across.first[x]), grid.at(below, across.second[x])};
-  const std::uint8_t best = grid.best[corners[0]];
+  const int best = grid.best[corners[0]];
   if (best == grid.best[corners[1]] && best == grid.best[corners[2]] && best == grid.best[corners[3]]) {
     std::memset(out + begin, best, static_cast<std::size_t>(end - begin));
     return;
   }
-  const Row left = mixed(grid.scores[corners[0]], grid.scores[corners[2]], down);
-  const Row right = mixed(grid.scores[corners[1]], grid.scores[corners[3]], down);
+  const Row left = grid.scores_between(corners[0], corners[2], down);
+  const Row right = grid.scores_between(corners[1], corners[3], down);
   for (int i = begin; i < end; ++i) {
     out[i] =
         static_cast<std::uint8_t>(best_of(mixed(left, right, across.weight[static_cast<std::size_t>(i)])));
