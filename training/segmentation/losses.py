@@ -10,7 +10,8 @@ from torch.nn import functional
 
 from training.segmentation import label_set
 
-IMPOSSIBLE = -1e4  # log of a probability that counts as zero
+IMPOSSIBLE = -1e4  # a score that no class can have
+SMALLEST = 1e-30  # probability that a set has at least, so that its logarithm is finite
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,26 @@ def labels_at(labels, size):
     return labels[:, rows][:, :, columns]
 
 
+class SetCrossEntropy(torch.autograd.Function):
+    """Eq. 2 for sets: -log of the probability that a set's classes have together. Scores and members are P x classes.
+
+    With p = softmax(scores) and q = p within the set, scaled to sum 1, the gradient is p - q. Written out, since
+    automatic differentiation of the same takes several times as long, and the loss is a large part of a step."""
+
+    @staticmethod
+    def forward(context, scores, members):
+        probabilities = torch.softmax(scores, 1)
+        within = probabilities * members
+        of_set = within.sum(1).clamp_(min=SMALLEST)
+        context.save_for_backward(probabilities.sub_(within.div_(of_set[:, None])))
+        return -of_set.log()
+
+    @staticmethod
+    def backward(context, gradient):
+        (difference,) = context.saved_tensors
+        return difference * gradient[:, None], None
+
+
 class PixelLoss(torch.nn.Module):
     """Loss of each pixel against a set of classes, zero where void: N x h x w."""
 
@@ -51,18 +72,17 @@ class PixelLoss(torch.nn.Module):
         self.form = form
         table = torch.from_numpy(label_set.membership())
         void = torch.ones(256 - len(table), table.shape[1])
-        members = torch.cat([table, void])
-        self.register_buffer("members", members, persistent=False)
-        self.register_buffer("outside", (1 - members) * IMPOSSIBLE, persistent=False)
+        self.register_buffer("members", torch.cat([table, void]), persistent=False)
 
     def forward(self, scores, labels):
-        inside = scores + self.outside[labels.long()].permute(0, 3, 1, 2)
-        if self.form == "cross-entropy":  # eq. 2: -log of the probability of the set
-            return torch.logsumexp(scores, 1) - torch.logsumexp(inside, 1)
-        # Eqs. 9-10: every class outside the set should score 1 less than the best inside.
-        best = inside.max(1, keepdim=True).values
-        members = self.members[labels.long()].permute(0, 3, 1, 2)
-        return (functional.relu(1 - (best - scores)) ** 2 * (1 - members)).sum(1)
+        members = self.members[labels.reshape(-1).long()]
+        scores = scores.permute(0, 2, 3, 1).reshape(members.shape)
+        if self.form == "cross-entropy":
+            losses = SetCrossEntropy.apply(scores, members)
+        else:  # eqs. 9-10: every class outside the set should score 1 less than the best inside
+            best = (scores + (1 - members) * IMPOSSIBLE).max(1, keepdim=True).values
+            losses = (functional.relu(1 - (best - scores)) ** 2 * (1 - members)).sum(1)
+        return losses.reshape(labels.shape)
 
 
 def class_weights(shares, balance):

@@ -45,6 +45,22 @@ class CrossEntropy(unittest.TestCase):
         self.assertLess(float(scores.grad.abs().max()), 1e-6)
 
 
+    def test_gradient_is_that_of_finite_differences(self):
+        labels = torch.tensor([[[3, label_set.set_number(label_set.PERSON)], [VOID, label_set.set_number((8, 9))]]],
+                              dtype=torch.uint8)
+        scores = torch.randn(1, 19, 2, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
+        weights = torch.tensor([[[1.0, 2.0], [3.0, 4.0]]], dtype=torch.float64)
+        loss = losses.PixelLoss().double()
+        self.assertTrue(torch.autograd.gradcheck(lambda s: (loss(s, labels) * weights).sum(), scores.requires_grad_()))
+
+    def test_hopeless_scores_stay_finite(self):
+        scores = scores_of({0: 500.0}).requires_grad_()
+        loss = losses.PixelLoss()(scores, labels_of(3))
+        loss.sum().backward()
+        self.assertTrue(torch.isfinite(loss).all() and torch.isfinite(scores.grad).all())
+        self.assertGreater(float(loss.detach()), 60)
+
+
 class SquaredHinge(unittest.TestCase):
     """Eqs. 9-10: every other class should score 1 less."""
 

@@ -55,6 +55,11 @@ class Networks(unittest.TestCase):
         network = networks.PSPNet(networks.variants()["roslam-pspnet"])
         self.assertLess(networks.parameters_in_inference(network), 1.5e6)
 
+    def test_sub_pixel_scores_are_the_same_in_training(self):
+        classifier = networks.SubPixelClassifier(8, 19)
+        x = torch.randn(2, 8, 5, 7)
+        torch.testing.assert_close(classifier.train()(x), classifier.eval()(x))
+
     def test_absurd_options_are_refused(self):
         with self.assertRaisesRegex(ValueError, "block5_stride"):
             networks.PSPNet(networks.NetworkOptions(block5_stride=4))
