@@ -26,6 +26,7 @@ struct RunArguments {
   std::string config;
   bool deterministic = false;
   bool real_time = false;
+  std::string model;    // weights in place of the shipped ones
   std::string dynamic;  // none or labels; empty: labels where the mode and the installation allow it
   bool print_config = false;
   bool quiet = false;
@@ -59,20 +60,17 @@ void require_poses(const Slam& slam, const RunSummary& summary, const FrameSourc
 // The network that finds what may move; null where nothing is to be removed.
 std::unique_ptr<PspnetSegmenter> open_segmenter(const RunArguments& arguments, const Options& options,
                                                 std::string& model) {
-  if (arguments.dynamic == "none") return nullptr;
-  const bool is_asked_for = arguments.dynamic == "labels";
-  const auto shipped = shipped_segmentation_model();
-  if (!shipped.empty() && (is_asked_for || !arguments.real_time)) {
-    model = shipped.string();
-    return std::make_unique<PspnetSegmenter>(shipped, options.segmenter);
+  const bool is_asked_for = arguments.dynamic == "labels" || !arguments.model.empty();
+  if (arguments.dynamic == "none" || (arguments.real_time && !is_asked_for)) return nullptr;
+  const std::filesystem::path file =
+      arguments.model.empty() ? shipped_segmentation_model() : std::filesystem::path(arguments.model);
+  if (!file.empty()) {
+    model = file.string();
+    return std::make_unique<PspnetSegmenter>(file, options.segmenter);
   }
-  if (is_asked_for) {
-    throw ModelError(
-        "models/roslam-pspnet.onnx: not found beside the program, and --dynamic labels needs it");
-  }
-  std::cerr << (shipped.empty() ? "note: models/roslam-pspnet.onnx not found beside the program: "
-                                : "note: real-time mode without --dynamic labels: ")
-            << "points on things that move are not removed\n";
+  if (is_asked_for) throw missing_segmentation_model();
+  std::cerr << "note: " << missing_segmentation_model().what()
+            << "; points on things that move are not removed\n";
   return nullptr;
 }
 
@@ -83,6 +81,10 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
       "tracked %zu of %zu frames (%.1f %%), %zu dropped%s\n", tracked, slam.frames(),
       100.0 * static_cast<double>(tracked) / static_cast<double>(std::max<std::size_t>(slam.frames(), 1)),
       summary.dropped, summary.interrupted ? ", interrupted" : "");
+  if (summary.removed_share > 0.0) {
+    std::printf("removed: %.1f %% of the picture on average, labelled as movable\n",
+                100.0 * summary.removed_share);
+  }
   std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
               slam.map().landmark_count());
   if (const auto found = times.find("tracking"); found != times.end()) {
@@ -167,6 +169,9 @@ void add_run_command(CLI::App& program, const std::string& version) {
                    "labels, and "
                    "none with --real-time, where the network would cost frames")
       ->check(CLI::IsMember({"none", "labels"}));
+  command->add_option(
+      "--model", arguments->model,
+      "Weights of the network that labels (ONNX), in place of those that come with the program");
   command->add_option("--traffic", arguments->source.traffic, "Of a simulated flight: none, light or heavy")
       ->check(CLI::IsMember({"none", "light", "heavy"}))
       ->capture_default_str();

@@ -100,10 +100,7 @@ void write_picture(const fs::path& file, const cv::Mat& picture) {
 fs::path model_of(const SegmentArguments& arguments) {
   if (!arguments.model.empty()) return arguments.model;
   const fs::path shipped = shipped_segmentation_model();
-  if (shipped.empty()) {
-    throw ModelError(
-        "models/roslam-pspnet.onnx: not found beside the program; install it or name it with --model");
-  }
+  if (shipped.empty()) throw missing_segmentation_model();
   return shipped;
 }
 

@@ -100,4 +100,9 @@ std::filesystem::path shipped_segmentation_model() {
   return {};
 }
 
+ModelError missing_segmentation_model() {
+  return ModelError(
+      "models/roslam-pspnet.onnx: not found beside the program; install it or name it with --model");
+}
+
 }  // namespace roslam

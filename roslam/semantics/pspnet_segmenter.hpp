@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "roslam/error.hpp"
 #include "roslam/semantics/inference.hpp"
 #include "roslam/semantics/segmenter.hpp"
 
@@ -45,5 +46,8 @@ class PspnetSegmenter : public Segmenter {
 /// The weights that ship with the program: models/roslam-pspnet.onnx beside the program or its build folder,
 /// or in share/roslam/models of an installation. Empty if there are none.
 std::filesystem::path shipped_segmentation_model();
+
+/// What to throw where they are needed and not there.
+ModelError missing_segmentation_model();
 
 }  // namespace roslam

@@ -2,11 +2,12 @@
 """python3 -m training.segmentation COMMAND: see --help and training/README.md."""
 import argparse
 import dataclasses
+import os
 import sys
 
 import torch
 
-from training.segmentation import ablation, checkpoint, cost, evaluation, export, figures, mixture, networks, train
+from training.segmentation import ablation, checkpoint, cost, evaluation, export, figures, mixture, networks, processes, train
 from training.segmentation.datasets import DataError
 from training.segmentation.losses import LossOptions
 
@@ -36,8 +37,11 @@ def training_options(arguments):
 
 
 def run_train(arguments):
+    if arguments.processes > 1 and "RANK" not in os.environ:
+        return processes.start(arguments.processes, sys.argv[1:])
     train.Trainer(arguments.data, arguments.out, training_options(arguments), arguments.cityscapes,
                   arguments.start_from).run()
+    return 0
 
 
 def run_evaluate(arguments):
@@ -94,6 +98,7 @@ def main():
     added.add_argument("--out", required=True, help="folder of the run: log.jsonl and last.pt; a run in it goes on")
     added.add_argument("--cityscapes", help="Cityscapes in its official layout, in place of the 256x256 copy")
     added.add_argument("--start-from", help="checkpoint whose weights a new run starts with")
+    added.add_argument("--processes", type=int, default=1, help="processes that share each batch, on this machine")
     add_options(added, train.TrainingOptions)
     add_options(added, LossOptions)
 
@@ -122,11 +127,10 @@ def main():
 
     arguments = parser.parse_args()
     try:
-        arguments.run(arguments)
+        return arguments.run(arguments) or 0
     except (DataError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    return 0
 
 
 if __name__ == "__main__":

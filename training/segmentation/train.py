@@ -96,6 +96,14 @@ class Processes:
             return network
         return DistributedDataParallel(network, [self.device.index] if self.device.type == "cuda" else None)
 
+    def any(self, flag):
+        """True if the flag is set in any process, so that all stop after the same step."""
+        if self.count == 1:
+            return flag
+        shared = torch.tensor([float(flag)], device=self.device)
+        distributed.all_reduce(shared, distributed.ReduceOp.MAX)
+        return bool(shared.item())
+
     def close(self):
         if self.count > 1:
             distributed.destroy_process_group()
@@ -237,6 +245,7 @@ class Trainer:
                 self.log.write(step=self.step, loss=sum(losses_since) / len(losses_since), rate=rate,
                                seconds=(time.monotonic() - begin) / len(losses_since))
                 begin, losses_since = time.monotonic(), []
+            self.stopped = self.processes.any(self.stopped)
             is_last = self.stopped or self.step == self.options.steps
             if is_last or self.step % self.options.save_every == 0:
                 self.save()

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What is labelled as movable gives no points, and a run without a network says so and goes on.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "roslam/pipeline/run.hpp"
+#include "roslam/semantics/segmenter.hpp"
+#include "tests/street.hpp"
+
+namespace roslam::street {
+namespace {
+
+constexpr int kBorder = 250;  // pixels; what is left of it counts as a person
+
+class LeftIsPerson : public Segmenter {
+ public:
+  Segmentation segment(const cv::Mat& image) override {
+    Segmentation result;
+    result.labels = cv::Mat::zeros(image.size(), CV_8UC1);
+    result.labels.colRange(0, kBorder) = 11;
+    result.seconds = 0.001;
+    return result;
+  }
+};
+
+TEST(Removal, NoPointOfTheMapLiesOnWhatMayMove) {
+  TumSource source(kFolder, *camera_preset("simulated"));
+  Slam slam(source.camera());
+  LeftIsPerson segmenter;
+  const RunSummary summary = run(source, slam, {}, {}, &segmenter);
+  ASSERT_FALSE(summary.failure);
+  EXPECT_GT(slam.trajectory().size(), 50U);
+  std::size_t points = 0;
+  float leftmost = 1e9F;
+  for (const KeyframeId id : slam.map().keyframe_ids()) {
+    for (const auto& pixel : slam.map().find(id)->view->pixels) {
+      leftmost = std::min(leftmost, pixel.x());
+      ++points;
+    }
+  }
+  EXPECT_GT(points, 1000U);
+  EXPECT_GE(leftmost, static_cast<float>(kBorder));
+  EXPECT_NEAR(summary.removed_share, static_cast<double>(kBorder) / source.camera().width, 1e-9);
+  EXPECT_EQ(summary.segmentation.summary().at("segmentation").count, slam.frames());
+}
+
+class DynamicRun : public Dataset {
+ protected:
+  const std::string kColours = "--model '" ROSLAM_TEST_FILES "/colours.onnx'";
+};
+
+TEST_F(DynamicRun, LabelsFramesAndReportsIt) {
+  const auto frames = frames_of_run(kColours);
+  const auto json = report();
+  EXPECT_EQ(json["dynamic"]["mode"], "labels");
+  EXPECT_EQ(json["processor_milliseconds"]["segmentation"]["count"], frames["processed"]);
+  frames_of_run(kColours + " --real-time");
+  EXPECT_EQ(report()["dynamic"]["mode"], "labels");
+  frames_of_run("--real-time");
+  EXPECT_EQ(report()["dynamic"]["mode"], "none");
+  frames_of_run(kColours + " --dynamic none");
+  EXPECT_EQ(report()["dynamic"]["mode"], "none");
+  EXPECT_FALSE(report()["processor_milliseconds"].contains("segmentation"));
+}
+
+TEST_F(DynamicRun, RefusesABadModelAndUnknownModes) {
+  expect_refused(run("--model '" ROSLAM_TEST_FILES "/eleven.onnx'"), {"eleven.onnx", "11 classes"});
+  expect_refused(run("--model none.onnx"), {"none.onnx: no such model file"});
+  EXPECT_EQ(run("--dynamic magic").code, 2);
+}
+
+TEST_F(DynamicRun, WithoutWeightsItSaysOnceThatNothingIsRemoved) {
+  const fs::path alone = scratch_ / "alone";
+  fs::create_directories(alone);
+  fs::copy_file(ROSLAM_PROGRAM, alone / "roslam");
+  const auto run_alone = [&](const std::string& arguments) {
+    return shell_in(scratch_, "alone/roslam run data --quiet --camera simulated --out run " + arguments);
+  };
+  const Outcome outcome = run_alone("");
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  EXPECT_NE(outcome.error.find("roslam-pspnet.onnx: not found"), std::string::npos) << outcome.error;
+  EXPECT_NE(outcome.error.find("not removed"), std::string::npos) << outcome.error;
+  EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  EXPECT_EQ(report()["dynamic"]["mode"], "none");
+  EXPECT_EQ(trajectory().size(), kFrames);
+  EXPECT_EQ(run_alone("--dynamic labels").code, 1);
+  EXPECT_EQ(run_alone("--dynamic none").error, "");
+}
+
+}  // namespace
+}  // namespace roslam::street
