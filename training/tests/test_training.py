@@ -116,8 +116,8 @@ class Training(unittest.TestCase):
     """Tiny runs on one made-up picture."""
 
     def trainer(self, folder, steps):
-        options = train.TrainingOptions(variant="wide-stem", steps=steps, batch=2, crop=64, workers=0, warm_up=2,
-                                        save_every=3, validate_every=1000, precision="float", average=0.5,
+        options = train.TrainingOptions(variant="wide-stem", steps=steps, batch=4, crop=64, workers=0, warm_up=2,
+                                        save_every=3, validate_every=1000, precision="float", average=0.9,
                                         loss=losses.LossOptions())
         with mock.patch.object(mixture, "training_sets", lambda *_: ([one_picture_set()], [red_person()])), \
                 mock.patch.object(mixture, "validation_sets", lambda *_: []):
@@ -130,8 +130,8 @@ class Training(unittest.TestCase):
             values = [e["loss"] for e in entries if "loss" in e]
             self.assertLess(values[-1], 0.7 * values[0])
             network = checkpoint.load_network(Path(folder) / "last.pt")
-            scored = evaluation.score(network, one_picture_set(), label_set.GROUPS8, 160)
-            self.assertGreater(scored["classes"]["flat"], 0.5)
+            scored = evaluation.score(network, one_picture_set(), label_set.GROUPS8, 64)
+            self.assertGreater(scored["classes"]["flat"], 0.7)
 
     def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(self):
         with tempfile.TemporaryDirectory() as whole, tempfile.TemporaryDirectory() as parts:
