@@ -56,7 +56,10 @@ def run_evaluate(arguments):
 
 
 def run_export(arguments):
-    export.export(checkpoint.load_network(arguments.checkpoint), arguments.out)
+    network = checkpoint.load_network(arguments.checkpoint)
+    export.export(network, arguments.out)
+    if arguments.weights:
+        checkpoint.save_weights(arguments.weights, network)
 
 
 def run_cost(arguments):
@@ -109,6 +112,7 @@ def main():
     added = command("export", run_export, "write a checkpoint as an ONNX file and check it with OpenCV")
     added.add_argument("--checkpoint", required=True)
     added.add_argument("--out", required=True, help="the ONNX file")
+    added.add_argument("--weights", help="also write the weights alone, in half precision, to start other runs from")
 
     added = command("cost", run_cost, "weights, multiply-adds and milliseconds of every variant, untrained")
     added.add_argument("--size", type=int, nargs=2, default=ablation.SIZE, metavar=("HEIGHT", "WIDTH"))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checkpoints that a crash cannot damage, and a moving average of the weights."""
 import copy
+import dataclasses
 import os
 from pathlib import Path
 
@@ -34,6 +35,12 @@ def load_network(file):
     network = networks.PSPNet(networks.NetworkOptions(**content["network_options"]))
     network.load_state_dict(content["average"])
     return network.eval()
+
+
+def save_weights(file, network):
+    """A checkpoint of the averaged weights alone, in half precision: what load_network and --start-from need."""
+    weights = {name: w.half() if w.is_floating_point() else w for name, w in network.state_dict().items()}
+    save(file, {"average": weights, "network_options": dataclasses.asdict(network.options)})
 
 
 class Average:

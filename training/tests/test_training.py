@@ -79,6 +79,16 @@ class Export(unittest.TestCase):
                 expected = network(picture).detach().numpy()
                 np.testing.assert_allclose(runner.forward(), expected, atol=1e-4 * np.abs(expected).max())
 
+    def test_weights_alone_are_a_checkpoint_of_half_the_size(self):
+        network = random_network()
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "network.pt"
+            checkpoint.save_weights(file, network)
+            again = checkpoint.load_network(file)
+            picture = torch.rand(1, 3, 64, 64)
+            torch.testing.assert_close(again(picture), network(picture), rtol=0.05, atol=0.05)
+            self.assertLess(file.stat().st_size, 3 * sum(p.numel() for p in network.parameters()))
+
     def test_a_pyramid_of_bins_exports_for_one_size(self):
         with tempfile.TemporaryDirectory() as folder:
             export.export(random_network("table2"), Path(folder) / "net.onnx")
