@@ -26,8 +26,8 @@ struct RunArguments {
   std::string config;
   bool deterministic = false;
   bool real_time = false;
-  std::string model;    // weights in place of the shipped ones
-  std::string dynamic;  // none or labels; empty: labels where the mode and the installation allow it
+  std::string model;  // weights in place of the shipped ones
+  std::string dynamic = "none";
   bool print_config = false;
   bool quiet = false;
   bool json = false;
@@ -57,21 +57,20 @@ void require_poses(const Slam& slam, const RunSummary& summary, const FrameSourc
                    " corners of known depth: check the images and depth_units_per_metre of the camera");
 }
 
-// The network that finds what may move; null where nothing is to be removed.
+// The network that finds what may move; null where nothing is to be removed. Without its weights a flight is
+// still worth tracking.
 std::unique_ptr<PspnetSegmenter> open_segmenter(const RunArguments& arguments, const Options& options,
                                                 std::string& model) {
-  const bool is_asked_for = arguments.dynamic == "labels" || !arguments.model.empty();
-  if (arguments.dynamic == "none" || (arguments.real_time && !is_asked_for)) return nullptr;
+  if (arguments.dynamic != "labels") return nullptr;
   const std::filesystem::path file =
       arguments.model.empty() ? shipped_segmentation_model() : std::filesystem::path(arguments.model);
-  if (!file.empty()) {
-    model = file.string();
-    return std::make_unique<PspnetSegmenter>(file, options.segmenter);
+  if (file.empty()) {
+    std::cerr << "note: " << missing_segmentation_model().what()
+              << "; points on things that move are not removed\n";
+    return nullptr;
   }
-  if (is_asked_for) throw missing_segmentation_model();
-  std::cerr << "note: " << missing_segmentation_model().what()
-            << "; points on things that move are not removed\n";
-  return nullptr;
+  model = file.string();
+  return std::make_unique<PspnetSegmenter>(file, options.segmenter);
 }
 
 void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder& folder) {
@@ -164,11 +163,12 @@ void add_run_command(CLI::App& program, const std::string& version) {
           "Stages on threads, frames at the pace of their timestamps; late frames are dropped and counted")
       ->excludes(deterministic);
   command
-      ->add_option("--dynamic", arguments->dynamic,
-                   "How points on things that may move are removed: labels (by a network) or none. Default: "
-                   "labels, and "
-                   "none with --real-time, where the network would cost frames")
-      ->check(CLI::IsMember({"none", "labels"}));
+      ->add_option(
+          "--dynamic", arguments->dynamic,
+          "How points on things that may move are removed: none, or labels (a network labels each frame "
+          "and the tracker waits for it)")
+      ->check(CLI::IsMember({"none", "labels"}))
+      ->capture_default_str();
   command->add_option(
       "--model", arguments->model,
       "Weights of the network that labels (ONNX), in place of those that come with the program");
