@@ -17,9 +17,10 @@ class AugmentationOptions:
     zoom: tuple = (0.9, 2.0)  # size of the picture's shorter side in crops
     stretch: tuple = (0.85, 1.2)  # width against height
     roll: float = 8.0  # degrees to each side
-    paste: float = 0.25  # probability that people are pasted in
+    paste: float = 0.0  # probability that people are pasted in
     paste_up_to: int = 3  # people
     near: float = 0.5  # share of pasted people that are larger than the crop is high or cut by its border
+    decoys: float = 0.0  # probability that things are pasted in that are no people, so that an edge makes no person
     hide: float = 0.35  # probability that something hides a part of a pasted person
     grey: float = 0.05  # probabilities of what the camera does
     blur: float = 0.3
@@ -35,12 +36,12 @@ def log_uniform(rng, low_high):
     return float(np.exp(rng.uniform(np.log(low_high[0]), np.log(low_high[1]))))
 
 
-def crop(rng, picture, labels, options, stretch=None):
+def crop(rng, picture, labels, options):
     """Scales, turns, mirrors and cuts out a square. What lies outside the picture is void."""
     side = options.crop
     height, width = labels.shape
     scale = side / min(height, width) * log_uniform(rng, options.zoom)
-    aspect = np.sqrt(log_uniform(rng, stretch or options.stretch))
+    aspect = np.sqrt(log_uniform(rng, options.stretch))
     scale_x, scale_y = scale * aspect, scale / aspect
     if scale < 0.6:  # shrink by areas first, or fine structure turns into noise
         size = (max(round(width * scale_x), 1), max(round(height * scale_y), 1))
@@ -75,8 +76,9 @@ def visible_part(rng, shape, options):
     return visible
 
 
-def paste_person(rng, picture, labels, person, mask, options):
-    """Puts a cut-out person into the crop (in place), near or far, lit as may be, perhaps partly hidden."""
+def paste_cutout(rng, picture, labels, person, mask, label, options):
+    """Puts a cut-out person, or what else it is, into the crop (in place), near or far, lit as may be, perhaps partly
+    hidden. label: set number of what it is."""
     side = labels.shape[0]
     is_near = rng.random() < options.near
     height = side * log_uniform(rng, (0.7, 3.0) if is_near else (0.12, 0.8))
@@ -110,7 +112,26 @@ def paste_person(rng, picture, labels, person, mask, options):
     light = np.float32(uniform(rng, (0.55, 1.1)) * rng.uniform(0.92, 1.08, 3))
     behind = picture[window].astype(np.float32)
     picture[window] = np.clip(behind + (drawn[window] * light - behind) * alpha, 0, 255)
-    labels[inside] = label_set.PERSON[0]
+    labels[inside] = label
+
+
+def decoy(rng, picture):
+    """A piece of a picture in the shape of a box, a slanted box, an ellipse or a blob, as a cutout."""
+    height, width = picture.shape[:2]
+    rows, columns = (max(int(side * rng.uniform(0.3, 0.9)), 8) for side in (height, width))
+    top, left = rng.integers(height - rows + 1), rng.integers(width - columns + 1)
+    mask = np.zeros((rows, columns), np.uint8)
+    shape = rng.integers(3)
+    if shape == 0:
+        mask[:] = 255
+    elif shape == 1:
+        cv2.ellipse(mask, (columns // 2, rows // 2), (columns // 2, rows // 2), 0, 0, 360, 255, -1)
+    else:
+        angles = np.sort(rng.uniform(0, 2 * np.pi, int(rng.integers(4, 10))))
+        radius = rng.uniform(0.5, 1.0, angles.size)
+        outline = np.stack([(1 + radius * np.cos(angles)) * columns / 2, (1 + radius * np.sin(angles)) * rows / 2], 1)
+        cv2.fillPoly(mask, [np.int32(outline)], 255)
+    return picture[top:top + rows, left:left + columns], mask
 
 
 def motion_blur(rng, picture):
@@ -148,10 +169,18 @@ def camera(rng, picture, options):
     return picture
 
 
-def augment(rng, picture, labels, people, options, stretch=None, paste=None):
-    """A training crop: RGB bytes (crop, crop, 3) and label sets (crop, crop). people: cutouts to paste."""
-    picture, labels = crop(rng, picture, labels, options, stretch)
-    if people and rng.random() < (options.paste if paste is None else paste):
-        for _ in range(int(rng.integers(1, options.paste_up_to + 1))):
-            paste_person(rng, picture, labels, *people[rng.integers(len(people))], options)
+def augment(rng, picture, labels, people, decoys, options):
+    """A training crop: RGB bytes (crop, crop, 3) and label sets (crop, crop).
+
+    people: cutouts to paste; decoys: pictures without anything movable, pieces of which are pasted."""
+    picture, labels = crop(rng, picture, labels, options)
+    pasted = []
+    if decoys and rng.random() < options.decoys:
+        static = label_set.set_number(label_set.STATIC)
+        pasted += [(*decoy(rng, decoys[rng.integers(len(decoys))]), static) for _ in range(int(rng.integers(1, 4)))]
+    if people and rng.random() < options.paste:
+        count = int(rng.integers(1, options.paste_up_to + 1))
+        pasted += [(*people[rng.integers(len(people))], label_set.PERSON[0]) for _ in range(count)]
+    for number in rng.permutation(len(pasted)):
+        paste_cutout(rng, picture, labels, *pasted[number], options)
     return camera(rng, picture, options), labels

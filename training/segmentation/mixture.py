@@ -1,33 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the network is trained and validated on: several datasets, each with a share of the samples."""
-from dataclasses import dataclass
+import dataclasses
+from dataclasses import dataclass, field
 
 import numpy as np
 from torch.utils import data
 
 from training.segmentation import augmentation, datasets, label_set
 
-CITYSCAPES_STRETCH = (0.9, 2.1)  # the 256x256 copy is squashed from 2:1, so anything from there to natural
-TRAINING_PARTS = ("cityscapes256", "camvid", "people", "drone_people", "coco128", "rooms")
-
-
 @dataclass(frozen=True)
 class Share:
-    """How often a dataset is drawn (relative), how it is stretched and how often people are pasted into it."""
+    """How often a dataset is drawn (relative), and what is done to it otherwise than by default."""
 
     weight: float
-    stretch: tuple = None
-    paste: float = 0.0
+    changes: dict = field(default_factory=dict)
 
 
+# The 256x256 copy of Cityscapes is squashed from 2:1, so it is stretched to anything from that to natural. What is seen
+# indoors is seen from everywhere: close up, and with the camera turned about its axis.
 SHARES = {
-    "cityscapes256": Share(0.48, CITYSCAPES_STRETCH, 0.12),
-    "cityscapes": Share(0.48, None, 0.12),
-    "camvid": Share(0.17, None, 0.12),
-    "people": Share(0.08),
-    "drone_people": Share(0.07),
-    "coco128": Share(0.06, None, 0.2),
-    "rooms": Share(0.14, None, 0.9),
+    "cityscapes256": Share(0.45, {"stretch": (0.9, 2.1), "paste": 0.12}),
+    "cityscapes": Share(0.45, {"paste": 0.12}),
+    "camvid": Share(0.17, {"paste": 0.12}),
+    "people": Share(0.08, {"roll": 25.0}),
+    "drone_people": Share(0.06),
+    "coco128": Share(0.08, {"zoom": (0.9, 3.0), "roll": 30.0, "paste": 0.25, "decoys": 0.2}),
+    "rooms": Share(0.16, {"zoom": (0.9, 4.0), "roll": 45.0, "paste": 0.55, "decoys": 0.35}),
 }
 
 
@@ -49,19 +47,21 @@ class Mixture(data.Dataset):
     workers or processes, and see the same samples."""
 
     def __init__(self, sets, people, seed, options=augmentation.AugmentationOptions()):
-        self.sets, self.people, self.seed, self.options = sets, people, seed, options
+        self.sets, self.people, self.seed = sets, people, seed
+        self.options = [dataclasses.replace(options, **SHARES[s.name].changes) for s in sets]
         weights = np.array([SHARES[s.name].weight for s in sets])
         self.probabilities = weights / weights.sum()
+        self.decoys = [picture for s in sets if s.name == "rooms" for picture in s.pictures]
 
     def __len__(self):
         return 2 ** 40
 
     def __getitem__(self, index):
         rng = np.random.default_rng([self.seed, index])
-        chosen = self.sets[rng.choice(len(self.sets), p=self.probabilities)]
+        number = rng.choice(len(self.sets), p=self.probabilities)
+        chosen = self.sets[number]
         picture, labels = chosen[rng.integers(len(chosen))]
-        share = SHARES[chosen.name]
-        picture, labels = augmentation.augment(rng, picture, labels, self.people, self.options, share.stretch, share.paste)
+        picture, labels = augmentation.augment(rng, picture, labels, self.people, self.decoys, self.options[number])
         return np.ascontiguousarray(picture), labels
 
 

@@ -129,7 +129,7 @@ class Training(unittest.TestCase):
         options = train.TrainingOptions(variant="wide-stem", steps=steps, batch=4, crop=64, workers=0, warm_up=2,
                                         save_every=3, validate_every=1000, precision="float", average=0.9,
                                         loss=losses.LossOptions())
-        with mock.patch.object(mixture, "training_sets", lambda *_: ([one_picture_set()], [red_person()])), \
+        with mock.patch.object(mixture, "training_sets", lambda *_: ([one_picture_set("camvid")], [red_person()])), \
                 mock.patch.object(mixture, "validation_sets", lambda *_: []):
             return train.Trainer("", folder, options)
 
