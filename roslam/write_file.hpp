@@ -5,6 +5,7 @@
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "roslam/error.hpp"
 
@@ -23,6 +24,15 @@ inline void write_file(const std::filesystem::path& file, std::string_view bytes
   out.flush();
   if (!out)
     throw OutputError(file.string() + ": cannot be written in full; check the free space on the disk");
+}
+
+/// Makes a folder, and those it lies in, where they are missing. Throws OutputError if it cannot be made.
+inline void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder, error)) {
+    throw OutputError(folder.string() + ": cannot create the output folder; choose another --out");
+  }
 }
 
 }  // namespace roslam

@@ -8,6 +8,7 @@
 
 #include "apps/roslam/child_process.hpp"
 #include "roslam/error.hpp"
+#include "roslam/write_file.hpp"
 
 namespace roslam::app {
 
@@ -95,8 +96,7 @@ BenchmarkRun run_sequence(const BenchmarkSequence& sequence, const BenchmarkSett
   // Files of an earlier benchmark must not pass for those of this run.
   for (const char* name : {"run.json", "trajectory.txt", "groundtruth.txt"})
     fs::remove(out / folder / name, error);
-  fs::create_directories(out / folder, error);
-  if (error) throw OutputError((out / folder).string() + ": cannot create the folder: " + error.message());
+  make_folder(out / folder);
   const auto result =
       run_this_program(run_arguments(sequence, settings, out / folder), out / folder / "stderr.txt", stop);
   if (result.code != 0) {

@@ -11,6 +11,7 @@
 #include "apps/roslam/benchmark_report.hpp"
 #include "apps/roslam/benchmark_sequences.hpp"
 #include "apps/roslam/interrupt.hpp"
+#include "apps/roslam/output.hpp"
 #include "roslam/error.hpp"
 #include "roslam/evaluation/trajectory_plot.hpp"
 #include "roslam/write_file.hpp"
@@ -122,9 +123,7 @@ void throw_if_any_failed(const BenchmarkReport& report) {
 void execute(const Arguments& arguments, const std::string& version) {
   const InterruptWatcher interrupt;
   const fs::path out = arguments.out;
-  std::error_code error;
-  fs::create_directories(out, error);
-  if (error) throw OutputError(out.string() + ": cannot create the folder; choose another --out");
+  make_folder(out);
   BenchmarkReport report{version,
                          processor_model(),
                          std::thread::hardware_concurrency(),
@@ -143,10 +142,9 @@ void execute(const Arguments& arguments, const std::string& version) {
     write_report(report, out);
   }
   if (report.is_interrupted) std::fprintf(stderr, "interrupted: the report holds what was complete\n");
-  std::cout << (arguments.json ? benchmark_json(report) : benchmark_summary(report)) << std::flush;
-  if (!arguments.json) std::cout << "results: " << (out / "benchmark.md").string() << std::endl;
-  if (!std::cout)
-    throw OutputError("stdout: the report cannot be written in full; check the disk or the pipe");
+  std::cout << (arguments.json ? benchmark_json(report) : benchmark_summary(report));
+  if (!arguments.json) std::cout << "results: " << (out / "benchmark.md").string() << "\n";
+  require_written_output();
   throw_if_any_failed(report);
 }
 

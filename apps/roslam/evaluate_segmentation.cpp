@@ -4,6 +4,7 @@
 #include <string>
 
 #include "apps/roslam/evaluate.hpp"
+#include "apps/roslam/output.hpp"
 #include "roslam/error.hpp"
 #include "roslam/evaluation/segmentation_error.hpp"
 
@@ -23,9 +24,8 @@ void run(const Arguments& arguments) {
   const LabelSet set = *label_set_from(arguments.classes);
   const SegmentationError error = evaluate_segmentation(arguments.truth, arguments.estimate, set,
                                                         arguments.truth_classes, arguments.estimate_classes);
-  std::cout << (arguments.json ? to_json(error, set.name) : to_markdown(error)) << std::flush;
-  if (!std::cout)
-    throw OutputError("stdout: the report cannot be written in full; check the disk or the pipe");
+  std::cout << (arguments.json ? to_json(error, set.name) : to_markdown(error));
+  require_written_output();
 }
 }  // namespace
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/roslam/evaluate.hpp"
+#include "apps/roslam/output.hpp"
 #include "roslam/error.hpp"
 #include "roslam/evaluation/trajectory_error.hpp"
 #include "roslam/evaluation/trajectory_plot.hpp"
@@ -145,9 +146,8 @@ void run(const Arguments& arguments) {
   report.others = evaluate_all(truth, others, report.options);
   // The figure first: if it cannot be written, there is no half of a result on stdout.
   if (!arguments.plot.empty()) draw(arguments, truth, report);
-  std::cout << (arguments.json ? to_json(report) : to_markdown(report)) << std::flush;
-  if (!std::cout)
-    throw OutputError("stdout: the report cannot be written in full; check the disk or the pipe");
+  std::cout << (arguments.json ? to_json(report) : to_markdown(report));
+  require_written_output();
 }
 
 // Written for usage errors: what the library would refuse is refused here, with exit code 2.

@@ -3,12 +3,12 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "apps/roslam/commands.hpp"
 #include "apps/roslam/interrupt.hpp"
+#include "apps/roslam/output.hpp"
 #include "apps/roslam/progress.hpp"
 #include "apps/roslam/sources.hpp"
 #include "roslam/error.hpp"
@@ -32,12 +32,6 @@ struct RunArguments {
   bool quiet = false;
   bool json = false;
 };
-
-std::string in_words(const std::map<std::string, std::size_t>& counts) {
-  std::string all;
-  for (const auto& [reason, count] : counts) all += "; " + std::to_string(count) + " x " + reason;
-  return all;
-}
 
 // A run without a single pose is no success, whatever was written.
 void require_poses(const Slam& slam, const RunSummary& summary, const FrameSource& source,
@@ -91,12 +85,6 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
                 found->second.p95_ms);
   }
   std::printf("results: %s\n", folder.path().c_str());
-}
-
-void require_written_output() {
-  if (std::fflush(stdout) != 0 || !std::cout.flush()) {
-    throw OutputError("stdout: cannot be written in full; check the disk or the pipe");
-  }
 }
 
 void execute(const RunArguments& arguments, const std::string& version) {

@@ -7,13 +7,13 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <system_error>
 #include <vector>
 
 #include "apps/roslam/commands.hpp"
 #include "apps/roslam/interrupt.hpp"
+#include "apps/roslam/output.hpp"
 #include "apps/roslam/progress.hpp"
 #include "roslam/error.hpp"
 #include "roslam/evaluation/markdown_table.hpp"
@@ -68,14 +68,6 @@ struct Findings {
   double confidence(std::size_t c) const { return areas[c] > 0.0 ? confidences[c] / areas[c] : 0.0; }
 };
 
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error || !fs::is_directory(folder, error)) {
-    throw OutputError(folder.string() + ": cannot create the output folder; choose another --out");
-  }
-}
-
 // Labels are named as the pictures: in their folder they would replace them.
 void protect_inputs(const SegmentArguments& arguments) {
   for (const auto& input : arguments.inputs) {
@@ -89,12 +81,6 @@ void protect_inputs(const SegmentArguments& arguments) {
       }
     }
   }
-}
-
-void write_picture(const fs::path& file, const cv::Mat& picture) {
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(file.extension().string(), picture, bytes);
-  write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 fs::path model_of(const SegmentArguments& arguments) {
@@ -166,11 +152,8 @@ void segment(const SegmentArguments& arguments) {
   const Findings found = label_all(arguments, set, *source, segmenter, interrupt.token());
   const bool interrupted = interrupt.token().stop_requested();
   if (found.pictures == 0 && !interrupted) {
-    std::string reasons;
-    for (const auto& [reason, count] : source->skipped())
-      reasons += "; " + std::to_string(count) + " x " + reason;
-    throw InputError(arguments.inputs.front() + ": no picture could be labelled" + reasons +
-                     "; check the files");
+    throw InputError(arguments.inputs.front() + ": no picture could be labelled" +
+                     in_words(source->skipped()) + "; check the files");
   }
   const Json summary = summary_json(arguments, model, found, *source, interrupted);
   write_file(arguments.out / "labels.json",
@@ -180,7 +163,7 @@ void segment(const SegmentArguments& arguments) {
   } else {
     print_summary(arguments, found, *source);
   }
-  if (!std::cout.flush()) throw OutputError("stdout: cannot be written in full; check the disk or the pipe");
+  require_written_output();
 }
 }  // namespace
 

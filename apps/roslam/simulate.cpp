@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <unistd.h>
-
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "apps/roslam/commands.hpp"
+#include "apps/roslam/output.hpp"
+#include "apps/roslam/progress.hpp"
 #include "roslam/error.hpp"
 #include "roslam/sources/simulated_source.hpp"
+#include "roslam/write_file.hpp"
 
 namespace roslam::app {
 namespace {
@@ -53,23 +53,6 @@ std::string stamp(double timestamp) {
   char text[32];
   std::snprintf(text, sizeof(text), "%.6f", timestamp);
   return text;
-}
-
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw OutputError("cannot create the folder " + folder.string() + ": " + error.message());
-}
-
-void write_image(const fs::path& file, const cv::Mat& image) {
-  bool written = false;
-  try {
-    written = cv::imwrite(file.string(), image, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  } catch (const cv::Exception&) {
-    written = false;
-  }
-  if (!written)
-    throw OutputError("cannot write " + file.string() + ": is the folder writable and the disk not full?");
 }
 
 /// A text file that is written line by line and checked at its end.
@@ -111,43 +94,14 @@ cv::Mat packed(const cv::Mat& depth, const Camera& camera) {
   return image;
 }
 
-/// Tells on stderr how far the work has come: a bar on a terminal, else a line every two seconds.
-class Progress {
- public:
-  explicit Progress(std::size_t total) : total_(total), terminal_(isatty(STDERR_FILENO) != 0) {}
-  void report(std::size_t done) {
-    const auto now = Clock::now();
-    const auto since = std::chrono::duration<double>(now - last_).count();
-    if (since < (terminal_ ? 0.1 : 2.0) && !(terminal_ && done == total_)) return;
-    last_ = now;
-    const double rate = static_cast<double>(done) / std::chrono::duration<double>(now - start_).count();
-    char text[160];
-    if (terminal_) {
-      const std::size_t filled = 30 * done / total_;
-      const std::string bar = std::string(filled, '#') + std::string(30 - filled, '.');
-      std::snprintf(text, sizeof(text), "\r[%s] %zu of %zu frames, %.1f a second %s", bar.c_str(), done,
-                    total_, rate, done == total_ ? "\n" : "");
-    } else {
-      std::snprintf(text, sizeof(text), "rendered %zu of %zu frames, %.1f a second\n", done, total_, rate);
-    }
-    std::cerr << text << std::flush;
-  }
-
- private:
-  std::size_t total_;
-  bool terminal_;
-  Clock::time_point start_ = Clock::now();
-  Clock::time_point last_ = start_;
-};
-
 void write_images(const fs::path& out, const std::string& name, const SimulatedView& view,
                   const Camera& camera) {
-  write_image(out / "rgb" / name, view.frame.colour);
-  write_image(out / "depth" / name, packed(view.frame.depth, camera));
-  write_image(out / "labels" / name, view.frame.labels);
-  write_image(out / "instances" / name, view.instances);
-  write_image(out / "background" / "rgb" / name, view.background_colour);
-  write_image(out / "background" / "depth" / name, packed(view.background_depth, camera));
+  write_picture(out / "rgb" / name, view.frame.colour);
+  write_picture(out / "depth" / name, packed(view.frame.depth, camera));
+  write_picture(out / "labels" / name, view.frame.labels);
+  write_picture(out / "instances" / name, view.instances);
+  write_picture(out / "background" / "rgb" / name, view.background_colour);
+  write_picture(out / "background" / "depth" / name, packed(view.background_depth, camera));
 }
 
 void simulate(const SimulateArguments& arguments) {
@@ -179,7 +133,7 @@ void simulate(const SimulateArguments& arguments) {
     colours.line(time + " rgb/" + time + ".png");
     depths.line(time + " depth/" + time + ".png");
     poses.line(pose_line(view.frame.timestamp, *view.frame.T_world_camera));
-    progress.report(i + 1);
+    progress.show(i + 1, "rendered");
   }
   colours.close();
   depths.close();
@@ -194,6 +148,7 @@ void simulate(const SimulateArguments& arguments) {
   } else {
     std::cout << "wrote " << simulator.size() << " frames to " << arguments.out.string() << "\n";
   }
+  require_written_output();
 }
 
 }  // namespace

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "roslam/error.hpp"
+#include "roslam/evaluation/json_number.hpp"
 #include "roslam/evaluation/markdown_table.hpp"
 #include "roslam/evaluation/segmentation_error.hpp"
 #include "roslam/sources/image_file.hpp"
@@ -108,7 +108,6 @@ cv::Mat positions(const Labels& labels, const fs::path& file) {
   return result;
 }
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 }  // namespace
 
 SegmentationError evaluate_segmentation(const fs::path& truth_folder, const fs::path& estimate_folder,

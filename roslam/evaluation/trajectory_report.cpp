@@ -8,6 +8,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "roslam/evaluation/json_number.hpp"
 #include "roslam/evaluation/markdown_table.hpp"
 
 namespace roslam {
@@ -81,8 +82,6 @@ std::string table_of(const TrajectoryReport& report, const std::vector<Column>& 
   std::for_each(report.others.begin(), report.others.end(), add);
   return markdown_table(rows);
 }
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json json_of(const Statistics& s) {
   return {{"count", s.count},           {"rmse", number(s.rmse)},   {"mean", number(s.mean)},

@@ -39,11 +39,8 @@ void write_one(const Result& result, const std::filesystem::path& file) {
 }  // namespace
 
 RunFolder::RunFolder(const std::filesystem::path& path) : path_(path) {
+  make_folder(path);
   std::error_code error;
-  std::filesystem::create_directories(path, error);
-  if (error || !std::filesystem::is_directory(path, error)) {
-    throw OutputError(path.string() + ": cannot create the output folder; choose another --out");
-  }
   if (std::filesystem::exists(path / "rgb.txt", error)) {
     throw OutputError(path.string() +
                       ": is a dataset, whose ground truth results could replace; choose another --out");

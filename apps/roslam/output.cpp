@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/output.hpp"
+
+#include <cstdint>
+#include <cstdio>
+#include <iostream>
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
+#include "roslam/error.hpp"
+#include "roslam/write_file.hpp"
+
+namespace roslam::app {
+
+void write_picture(const std::filesystem::path& file, const cv::Mat& picture) {
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(file.extension().string(), picture, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+void require_written_output() {
+  if (std::fflush(stdout) != 0 || !std::cout.flush()) {
+    throw OutputError("stdout: cannot be written in full; check the disk or the pipe");
+  }
+}
+
+std::string in_words(const std::map<std::string, std::size_t>& counts) {
+  std::string all;
+  for (const auto& [reason, count] : counts) all += "; " + std::to_string(count) + " x " + reason;
+  return all;
+}
+
+}  // namespace roslam::app
