@@ -7,7 +7,8 @@ import sys
 
 import torch
 
-from training.segmentation import ablation, checkpoint, cost, evaluation, export, figures, mixture, networks, processes, train
+from training.segmentation import (ablation, checkpoint, cost, evaluation, export, figures, label_set,
+                                   mixture, networks, processes, train)
 from training.segmentation.datasets import DataError
 from training.segmentation.losses import LossOptions
 
@@ -47,7 +48,7 @@ def run_train(arguments):
 def run_evaluate(arguments):
     network = checkpoint.load_network(arguments.checkpoint)
     sets = mixture.validation_sets(arguments.data)
-    sets.append((sets[0][0], evaluation.CITYSCAPES19))
+    sets.append((sets[0][0], label_set.CITYSCAPES19))
     for data, groups in sets:
         scored = evaluation.score(network, data, groups, arguments.side)
         print(f"{data.name}: mean IoU {scored['mean']:.4f} over {len(groups)} classes, {len(data)} pictures")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from training.segmentation import checkpoint, cost, evaluation, label_set, losses, mixture, networks, train
+from training.segmentation import checkpoint, cost, evaluation, losses, mixture, networks, train
 
 SIZE = (288, 384)  # what the network sees of a 640x480 camera by default
 
@@ -19,16 +19,10 @@ def experiments():
     ladder["auxiliary by class share"] = (default, {"loss": losses.LossOptions(by_class=True, auxiliary=1.0)})
     ladder["squared hinge"] = (default, {"loss": losses.LossOptions(form="squared-hinge")})
     ladder["no class balance"] = (default, {"loss": losses.LossOptions(balance=0.0)})
-    ladder["Adam at 0.01"] = (default, {"learning_rate": 0.01})
+    ladder["no Jaccard"] = (default, {"loss": losses.LossOptions(jaccard=0.0)})
+    ladder["Adam"] = (default, {"optimiser": "adam"})
+    ladder["Adam at 0.01"] = (default, {"optimiser": "adam", "learning_rate": 0.01})
     return ladder
-
-
-def scores_of(network, validation):
-    result = {}
-    for data, groups in validation:
-        scored = evaluation.score(network, data, groups)
-        result[data.name] = scored["classes"]["person"] if groups is label_set.PERSON1 else scored["mean"]
-    return result
 
 
 def run(data_folder, out, options, names=()):
@@ -48,7 +42,7 @@ def run(data_folder, out, options, names=()):
         network = checkpoint.load_network(folder / "last.pt")
         threads = torch.get_num_threads()
         torch.set_num_threads(1)
-        rows.append({"name": name, "steps": options.steps, **cost.measure(network, SIZE), **scores_of(network, validation)})
+        rows.append({"name": name, "steps": options.steps, **cost.measure(network, SIZE), **evaluation.score_all(network, validation)})
         torch.set_num_threads(threads)
         (out / "ablation.json").write_text(json.dumps(rows, indent=1))
         (out / "ablation.md").write_text(markdown(rows))

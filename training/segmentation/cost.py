@@ -18,11 +18,10 @@ def multiply_adds(network, size):
 
     def count(layer, _, output):
         nonlocal total
-        kernel = layer.weight.numel() / (layer.in_channels if isinstance(layer, nn.ConvTranspose2d) else layer.out_channels)
         if isinstance(layer, nn.ConvTranspose2d):  # each output pixel of stride = kernel sees one input pixel
             total += output.numel() * layer.in_channels
         else:
-            total += int(output.numel() * kernel)
+            total += output.numel() * (layer.weight.numel() // layer.out_channels)
 
     hooks = [m.register_forward_hook(count) for m in network.modules() if isinstance(m, (nn.Conv2d, nn.ConvTranspose2d))]
     with torch.no_grad():

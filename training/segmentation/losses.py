@@ -20,7 +20,8 @@ class LossOptions:
     by_class: split the auxiliary loss by class, weighted by the classes' shares alpha (eq. 1); otherwise it is the mean
     over pixels. floor: gamma, below which the auxiliary loss of a class does not train any more (eq. 6).
     head_decay: factor of the squared norms of the output weights (eqs. 4 and 6). balance: c in the class weights
-    1 / log(c + share) of the main loss; 0 = all equal."""
+    1 / log(c + share) of the main loss; 0 = all equal. jaccard: weight of a soft Jaccard loss of the output, which
+    asks for what is measured in the end; 0 = none."""
 
     form: str = "cross-entropy"
     auxiliary: float = 0.4
@@ -28,12 +29,13 @@ class LossOptions:
     floor: float = 0.0
     head_decay: float = 0.0
     balance: float = 1.05
+    jaccard: float = 0.5
 
     def validate(self):
         if self.form not in ("cross-entropy", "squared-hinge"):
             raise ValueError("form must be cross-entropy or squared-hinge")
-        if min(self.auxiliary, self.floor, self.head_decay) < 0:
-            raise ValueError("auxiliary, floor and head_decay must not be negative")
+        if min(self.auxiliary, self.floor, self.head_decay, self.jaccard) < 0:
+            raise ValueError("auxiliary, floor, head_decay and jaccard must not be negative")
 
 
 def labels_at(labels, size):
@@ -85,6 +87,38 @@ class PixelLoss(torch.nn.Module):
         return losses.reshape(labels.shape)
 
 
+class SoftJaccard(torch.nn.Module):
+    """1 - intersection over union by probabilities, the mean over the classes that a batch has (M. A. Rahman, Y. Wang,
+    "Optimizing intersection-over-union in deep neural networks for image segmentation", 2016), for label sets.
+
+    What a pixel gives to the classes within its set are hits, outside it false alarms; what its set lacks is a miss of
+    its classes, in proportion to what they have. Sets of more classes than LARGEST say too little of each: their
+    pixels count for false alarms only. Every second row and column is read, which serves as well."""
+
+    LARGEST = 5  # classes of a set
+    RAREST = 8  # pixels of a class that a batch must have
+
+    def __init__(self):
+        super().__init__()
+        table = torch.from_numpy(label_set.membership())
+        self.register_buffer("members", torch.cat([table, torch.ones(256 - len(table), table.shape[1])]), persistent=False)
+
+    def forward(self, scores, labels):
+        labels = labels[:, ::2, ::2].reshape(-1).long()
+        probabilities = torch.softmax(scores[:, :, ::2, ::2], 1).permute(0, 2, 3, 1).reshape(len(labels), -1)
+        members = self.members[labels]
+        within = probabilities * members
+        of_set = within.sum(1, keepdim=True)
+        tells = (members.sum(1, keepdim=True) <= self.LARGEST).to(within.dtype)
+        parts = tells * within.detach() / of_set.detach().clamp(min=SMALLEST)
+        hits = (within * tells).sum(0)
+        false_alarms = (probabilities - within).sum(0)  # void has all classes, hence none
+        misses = (parts * (1 - of_set)).sum(0)
+        present = (parts.sum(0) >= self.RAREST).to(within.dtype)
+        quality = hits / (hits + false_alarms + misses).clamp(min=SMALLEST)
+        return (present * (1 - quality)).sum() / present.sum().clamp(min=1)
+
+
 def class_weights(shares, balance):
     """One weight a label set, by its share of the pixels, with mean 1 over the pixels."""
     shares = torch.as_tensor(shares, dtype=torch.float32)
@@ -104,6 +138,7 @@ class DeepSupervision(torch.nn.Module):
         options.validate()
         self.options = options
         self.pixel_loss = PixelLoss(options.form)
+        self.jaccard = SoftJaccard()
         shares = torch.as_tensor(shares, dtype=torch.float32)
         extra = torch.zeros(256 - len(shares))
         self.register_buffer("shares", torch.cat([shares, extra]), persistent=False)
@@ -135,6 +170,8 @@ class DeepSupervision(torch.nn.Module):
         loss = self.main(main, labels)
         if self.options.auxiliary:
             loss = loss + self.options.auxiliary * sum(self.hidden(h, labels) for h in hidden)
+        if self.options.jaccard:
+            loss = loss + self.options.jaccard * self.jaccard(main, labels_at(labels, main.shape[2:]))
         if self.options.head_decay:
             loss = loss + self.options.head_decay * sum((w ** 2).sum() for w in heads)
         return loss

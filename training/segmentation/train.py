@@ -15,7 +15,7 @@ from torch import distributed
 from torch.nn.parallel import DistributedDataParallel
 from torch.utils import data
 
-from training.segmentation import checkpoint, evaluation, losses, mixture, networks
+from training.segmentation import checkpoint, evaluation, losses, mixture, networks, optimiser
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,8 @@ class TrainingOptions:
     variant: str = "roslam-pspnet"  # of networks.variants()
     steps: int = 20000  # of one batch each
     batch: int = 16  # crops, over all processes
-    learning_rate: float = 2e-3  # after the warm-up
+    optimiser: str = "orthogonal"  # orthogonal or adam
+    learning_rate: float = 2.5e-3  # after the warm-up
     warm_up: int = 300  # steps
     decay_share: float = 0.3  # last share of the steps, over which the rate falls to zero
     weight_decay: float = 0.01
@@ -40,6 +41,8 @@ class TrainingOptions:
     def validate(self):
         if self.variant not in networks.variants():
             raise ValueError(f"variant {self.variant}: one of {', '.join(networks.variants())}")
+        if self.optimiser not in ("orthogonal", "adam"):
+            raise ValueError("optimiser must be orthogonal or adam")
         if min(self.steps, self.batch, self.crop) < 1 or not 0 < self.learning_rate < 1:
             raise ValueError("steps, batch and crop must be positive, learning_rate between 0 and 1")
         if self.crop % networks.SIZE_MULTIPLE:
@@ -72,14 +75,6 @@ def cpu_has_bfloat16():
         return False
 
 
-def parameter_groups(network, weight_decay):
-    """No decay for biases, normalisation and depthwise filters, which have few weights and no excess to remove."""
-    decayed, free = [], []
-    for parameter in network.parameters():
-        (decayed if parameter.ndim == 4 and parameter.shape[1] > 1 else free).append(parameter)
-    return [{"params": decayed, "weight_decay": weight_decay}, {"params": free, "weight_decay": 0.0}]
-
-
 class Processes:
     """The processes that train together: one, or as many as torchrun started."""
 
@@ -88,6 +83,9 @@ class Processes:
         self.rank = int(os.environ.get("RANK", 0))
         local = int(os.environ.get("LOCAL_RANK", 0))
         self.device = torch.device("cuda", local) if torch.cuda.is_available() else torch.device("cpu")
+        # One tensor for the whole run: a thread of PyTorch 1.13 that lets the last reference to one go while the
+        # processes part waits for them for ever.
+        self.flag = torch.zeros(1, device=self.device)
         if self.count > 1:
             distributed.init_process_group("nccl" if self.device.type == "cuda" else "gloo")
 
@@ -100,9 +98,9 @@ class Processes:
         """True if the flag is set in any process, so that all stop after the same step."""
         if self.count == 1:
             return flag
-        shared = torch.tensor([float(flag)], device=self.device)
-        distributed.all_reduce(shared, distributed.ReduceOp.MAX)
-        return bool(shared.item())
+        self.flag.fill_(float(flag))
+        distributed.all_reduce(self.flag, distributed.ReduceOp.MAX)
+        return bool(self.flag.item())
 
     def close(self):
         if self.count > 1:
@@ -169,7 +167,8 @@ class Trainer:
         self.network = network.to(self.processes.device, memory_format=torch.channels_last)
         self.shares = mixture.set_shares(self.samples)
         self.loss = losses.DeepSupervision(self.shares, options.loss).to(self.processes.device)
-        self.optimiser = torch.optim.AdamW(parameter_groups(self.network, options.weight_decay), options.learning_rate)
+        self.optimisers = optimiser.optimisers(self.network, options.optimiser, options.learning_rate,
+                                               options.weight_decay)
         self.average = checkpoint.Average(self.network, options.average)
         self.scaler = torch.cuda.amp.GradScaler(
             enabled=self.processes.device.type == "cuda" and not torch.cuda.is_bf16_supported())
@@ -185,43 +184,42 @@ class Trainer:
     def restore(self, content):
         self.network.load_state_dict(content["network"])
         self.average.network.load_state_dict(content["average"])
-        self.optimiser.load_state_dict(content["optimiser"])
+        if content["training_options"].get("optimiser") == self.options.optimiser:  # another starts with what it can
+            for mine, saved in zip(self.optimisers, content["optimisers"]):
+                mine.load_state_dict(saved)
         self.step = content["step"]
 
     def save(self, name="last.pt"):
         if self.processes.rank == 0:
             checkpoint.save(self.out / name, {
                 "network": self.network.state_dict(), "average": self.average.network.state_dict(),
-                "optimiser": self.optimiser.state_dict(), "step": self.step,
+                "optimisers": [o.state_dict() for o in self.optimisers], "step": self.step,
                 "network_options": dataclasses.asdict(self.network.options),
                 "training_options": dataclasses.asdict(self.options)})
 
     def validate(self):
         if not self.validation:
             return
-        result = {}
-        for data_set, groups in self.validation:
-            scored = evaluation.score(self.average.network, data_set, groups)
-            result[data_set.name] = scored["classes"]["person"] if groups is mixture.label_set.PERSON1 else scored["mean"]
-            if data_set.name == "cityscapes256":
-                result["car"] = scored["classes"]["car"]
+        result = evaluation.score_all(self.average.network, self.validation)
         self.log.write(step=self.step, **{f"iou_{k}": round(v, 4) for k, v in result.items()})
 
     def train_step(self, network, pictures, labels):
         options, device = self.options, self.processes.device
         rate = rate_at(self.step, options)
-        for group in self.optimiser.param_groups:
+        for group in (group for o in self.optimisers for group in o.param_groups):
             group["lr"] = rate
         images = pictures.to(device, non_blocking=True).permute(0, 3, 1, 2).float().div(255)
         images = images.contiguous(memory_format=torch.channels_last)
         with half_precision(device, options.precision):
             outputs = network(images)
         loss = self.loss(outputs, labels.to(device, non_blocking=True), self.head_weights())
-        self.optimiser.zero_grad(set_to_none=True)
+        self.network.zero_grad(set_to_none=True)
         self.scaler.scale(loss).backward()
-        self.scaler.unscale_(self.optimiser)
+        for each in self.optimisers:
+            self.scaler.unscale_(each)
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
-        self.scaler.step(self.optimiser)
+        for each in self.optimisers:
+            self.scaler.step(each)
         self.scaler.update()
         self.average.update(self.network, self.step)
         self.step += 1

@@ -91,7 +91,7 @@ class Deep(unittest.TestCase):
         self.at_11 = math.log(math.exp(1) + 18) - 1
 
     def loss(self, **options):
-        return losses.DeepSupervision(self.shares, losses.LossOptions(**options))
+        return losses.DeepSupervision(self.shares, losses.LossOptions(**{"jaccard": 0, **options}))
 
     def test_main_loss_without_balance_is_the_mean(self):
         loss = self.loss(balance=0, auxiliary=0)((self.scores, self.scores, self.scores), self.labels)
@@ -115,6 +115,15 @@ class Deep(unittest.TestCase):
         held = self.loss(balance=0, head_decay=0.1)(outputs, self.labels, [torch.full((2, 1), 3.0)])
         self.assertAlmostEqual(float(held - plain), 0.1 * 18, places=4)
 
+    def test_the_jaccard_loss_is_added_with_its_weight(self):
+        scores = self.scores.repeat_interleave(8, 2)  # 8 pixels of each class, read in every second row and column
+        scores = scores.repeat_interleave(4, 3)
+        labels = self.labels.repeat_interleave(8, 1).repeat_interleave(4, 2)
+        outputs = (scores,) * 3
+        added = self.loss(jaccard=2)(outputs, labels) - self.loss()(outputs, labels)
+        self.assertAlmostEqual(float(added), 2 * float(losses.SoftJaccard()(scores, labels)), places=5)
+        self.assertGreater(float(added), 0.1)
+
     def test_balance_lifts_rare_classes_and_keeps_the_mean(self):
         weights = losses.class_weights(self.shares, 1.05)
         self.assertGreater(float(weights[11]), float(weights[0]))
@@ -125,6 +134,32 @@ class Deep(unittest.TestCase):
         mean = (self.at_0 + self.at_11) / 2
         loss = self.loss(balance=0, auxiliary=0.4)(outputs, self.labels)
         self.assertAlmostEqual(float(loss), mean + 0.4 * 2 * mean, places=5)
+
+
+class SoftJaccard(unittest.TestCase):
+    @staticmethod
+    def loss(*counted):
+        """counted: (predicted class, true set, pixels). Every pixel fills 2x2, of which one is read."""
+        predicted = [p for p, _, count in counted for _ in range(count)]
+        true = [t for _, t, count in counted for _ in range(count)]
+        scores = scores_of(*({p: 60.0} for p in predicted)).repeat_interleave(2, 2).repeat_interleave(2, 3)
+        labels = labels_of(*true).repeat_interleave(2, 1).repeat_interleave(2, 2)
+        return float(losses.SoftJaccard()(scores, labels))
+
+    def test_is_one_less_the_mean_intersection_over_union_of_certain_labels(self):
+        # class 3: 30 hits, 10 false alarms; class 4: 10 misses
+        self.assertAlmostEqual(self.loss((3, 3, 30), (3, 4, 10)), 1 - (0.75 + 0) / 2, places=5)
+
+    def test_a_set_is_hit_by_any_of_its_classes(self):
+        person = label_set.set_number(label_set.PERSON)
+        self.assertAlmostEqual(self.loss((11, person, 20), (3, 3, 20)), 0.0, places=5)
+
+    def test_a_set_that_says_little_counts_for_false_alarms_alone(self):
+        person, other = label_set.set_number(label_set.PERSON), label_set.set_number(label_set.NOT_PERSON)
+        self.assertAlmostEqual(self.loss((11, person, 20), (11, other, 20), (0, other, 50)), 0.5, places=5)
+
+    def test_void_and_classes_that_are_hardly_there_do_not_count(self):
+        self.assertAlmostEqual(self.loss((3, 3, 20), (3, VOID, 20), (4, 4, 7)), 0.0, places=5)
 
 
 class LabelSampling(unittest.TestCase):
