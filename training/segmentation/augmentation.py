@@ -169,15 +169,33 @@ def camera(rng, picture, options):
     return picture
 
 
+@dataclass(frozen=True)
+class Decoys:
+    """What is pasted in and is no person: pieces of pictures without anything movable, and cutouts of things."""
+
+    pictures: list
+    things: list
+
+    def draw(self, rng):
+        """A cutout; None where there is nothing to draw from."""
+        sources = [s for s in (self.pictures, self.things) if s]
+        if not sources:
+            return None
+        source = sources[rng.integers(len(sources))]
+        drawn = source[rng.integers(len(source))]
+        return decoy(rng, drawn) if source is self.pictures else drawn
+
+
 def augment(rng, picture, labels, people, decoys, options):
     """A training crop: RGB bytes (crop, crop, 3) and label sets (crop, crop).
 
-    people: cutouts to paste; decoys: pictures without anything movable, pieces of which are pasted."""
+    people: cutouts to paste; decoys: Decoys."""
     picture, labels = crop(rng, picture, labels, options)
     pasted = []
-    if decoys and rng.random() < options.decoys:
+    if rng.random() < options.decoys:
         static = label_set.set_number(label_set.STATIC)
-        pasted += [(*decoy(rng, decoys[rng.integers(len(decoys))]), static) for _ in range(int(rng.integers(1, 4)))]
+        drawn = [decoys.draw(rng) for _ in range(int(rng.integers(1, 4)))]
+        pasted += [(*d, static) for d in drawn if d is not None]
     if people and rng.random() < options.paste:
         count = int(rng.integers(1, options.paste_up_to + 1))
         pasted += [(*people[rng.integers(len(people))], label_set.PERSON[0]) for _ in range(count)]

@@ -111,23 +111,44 @@ def drone_people(data, split):
                       label_set.FROM_PERSON_MASK)
 
 
-def coco128(data):
-    """Polygons of things that may move over pictures of all kinds; the rest is static."""
+def coco_outlines(data):
+    """For each picture of COCO128: the picture and a list of (COCO's number of the class, polygon in pixels)."""
     folder = Path(data) / "segmentation/coco128"
-    result = LabelledPictures("coco128")
     for file in files_in(folder / "images"):
         picture = read_picture(file)
-        height, width = picture.shape[:2]
-        labels = np.full((height, width), label_set.set_number(label_set.STATIC), np.uint8)
+        size = picture.shape[1::-1]
         outlines = folder / "labels" / f"{file.stem}.txt"
-        for line in outlines.read_text().splitlines() if outlines.exists() else []:
-            number, *points = line.split()
-            if int(number) in label_set.COCO:
-                polygon = np.array(points, np.float32).reshape(-1, 2) * (width, height)
-                cv2.fillPoly(labels, [np.round(polygon).astype(np.int32)],
-                             label_set.set_number(label_set.COCO[int(number)]))
+        lines = [line.split() for line in outlines.read_text().splitlines()] if outlines.exists() else []
+        yield picture, [(int(number), np.round(np.array(points, np.float32).reshape(-1, 2) * size).astype(np.int32))
+                        for number, *points in lines]
+
+
+def coco128(data):
+    """Polygons of things that may move over pictures of all kinds; the rest is static."""
+    result = LabelledPictures("coco128")
+    for picture, outlines in coco_outlines(data):
+        labels = np.full(picture.shape[:2], label_set.set_number(label_set.STATIC), np.uint8)
+        for number, polygon in outlines:
+            if number in label_set.COCO:
+                cv2.fillPoly(labels, [polygon], label_set.set_number(label_set.COCO[number]))
         result.pictures.append(picture)
         result.labels.append(labels)
+    return result
+
+
+def static_things(data, smallest=40):
+    """Furniture, screens, cups and what else COCO128 has outlines of that does not move, cut out as cutouts() does
+    people. smallest: pixels of both sides that a thing must have."""
+    result = []
+    for picture, outlines in coco_outlines(data):
+        for number, polygon in outlines:
+            x, y, width, height = cv2.boundingRect(polygon)
+            if number in label_set.COCO or min(width, height) < smallest:
+                continue
+            mask = np.zeros(picture.shape[:2], np.uint8)
+            cv2.fillPoly(mask, [polygon], 255)
+            window = np.s_[y:y + height, x:x + width]
+            result.append((picture[window].copy(), mask[window].copy()))
     return result
 
 

@@ -22,15 +22,15 @@ SHARES = {
     "cityscapes256": Share(0.45, {"stretch": (0.9, 2.1), "paste": 0.12}),
     "cityscapes": Share(0.45, {"paste": 0.12}),
     "camvid": Share(0.17, {"paste": 0.12}),
-    "people": Share(0.08, {"roll": 25.0}),
+    "people": Share(0.10, {"roll": 25.0}),
     "drone_people": Share(0.06),
-    "coco128": Share(0.08, {"zoom": (0.9, 3.0), "roll": 30.0, "paste": 0.25, "decoys": 0.2}),
-    "rooms": Share(0.16, {"zoom": (0.9, 4.0), "roll": 45.0, "paste": 0.55, "decoys": 0.35}),
+    "coco128": Share(0.10, {"zoom": (0.9, 3.0), "roll": 30.0, "paste": 0.25, "decoys": 0.5}),
+    "rooms": Share(0.30, {"zoom": (0.9, 4.0), "roll": 45.0, "paste": 0.4, "decoys": 0.6}),
 }
 
 
 def training_sets(folder, official_cityscapes=None, only=()):
-    """Everything to train on, and the people to paste. only: names to keep; empty = all."""
+    """Everything to train on, the people to paste, and things that are none. only: names to keep; empty = all."""
     readers = {name: lambda name=name: getattr(datasets, name)(folder, "train")
                for name in ("cityscapes256", "camvid", "people", "drone_people")}
     readers["coco128"] = lambda: datasets.coco128(folder)
@@ -39,19 +39,19 @@ def training_sets(folder, official_cityscapes=None, only=()):
         del readers["cityscapes256"]
         readers["cityscapes"] = lambda: datasets.cityscapes(official_cityscapes, "train")
     sets = [read() for name, read in readers.items() if not only or name in only]
-    return sets, datasets.cutouts(folder, "train")
+    rooms = [picture for s in sets if s.name == "rooms" for picture in s.pictures]
+    return sets, datasets.cutouts(folder, "train"), augmentation.Decoys(rooms, datasets.static_things(folder))
 
 
 class Mixture(data.Dataset):
     """Sample i is a function of (seed, i) alone, so that training may stop and go on anywhere, with any number of
     workers or processes, and see the same samples."""
 
-    def __init__(self, sets, people, seed, options=augmentation.AugmentationOptions()):
-        self.sets, self.people, self.seed = sets, people, seed
+    def __init__(self, sets, people, decoys, seed, options=augmentation.AugmentationOptions()):
+        self.sets, self.people, self.decoys, self.seed = sets, people, decoys, seed
         self.options = [dataclasses.replace(options, **SHARES[s.name].changes) for s in sets]
         weights = np.array([SHARES[s.name].weight for s in sets])
         self.probabilities = weights / weights.sum()
-        self.decoys = [picture for s in sets if s.name == "rooms" for picture in s.pictures]
 
     def __len__(self):
         return 2 ** 40

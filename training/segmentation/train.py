@@ -158,9 +158,9 @@ class Trainer:
         self.processes = Processes()
         self.out.mkdir(parents=True, exist_ok=True)
         self.log = Log(self.out / "log.jsonl", self.processes.rank == 0)
-        sets, people = mixture.training_sets(data_folder, cityscapes, options.only)
+        sets, people, decoys = mixture.training_sets(data_folder, cityscapes, options.only)
         crops = dataclasses.replace(mixture.augmentation.AugmentationOptions(), crop=options.crop)
-        self.samples = mixture.Mixture(sets, people, options.seed, crops)
+        self.samples = mixture.Mixture(sets, people, decoys, options.seed, crops)
         self.validation = mixture.validation_sets(data_folder) if self.processes.rank == 0 else []
         torch.manual_seed(options.seed)
         network = networks.PSPNet(networks.variants()[options.variant])

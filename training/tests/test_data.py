@@ -9,6 +9,7 @@ import numpy as np
 
 from training.segmentation import augmentation, datasets, label_set, mixture
 
+NO_DECOYS = augmentation.Decoys([], [])
 SHARED = Path(os.environ.get("ROSLAM_TEST_DATA", "../shared/data"))
 
 
@@ -48,16 +49,42 @@ def red_person():
     return np.full((90, 30, 3), (255, 0, 0), np.uint8), mask
 
 
+class DecoysInCrops(unittest.TestCase):
+    def test_things_are_drawn_and_labelled_static(self):
+        mask = np.full((60, 60), 255, np.uint8)
+        green = np.full((60, 60, 3), (0, 255, 0), np.uint8)
+        options = augmentation.AugmentationOptions(decoys=1.0, hide=0.0, grey=0.0, blur=0.0, noise=0.0, compression=0.0)
+        static = label_set.set_number(label_set.STATIC)
+        found = 0
+        for seed in range(10):
+            picture, labels = augmentation.augment(np.random.default_rng(seed), *one_picture_set()[0], [],
+                                                   augmentation.Decoys([], [(green, mask)]), options)
+            green_pixels = picture[..., 1].astype(int) > picture[..., 0].astype(int) + 90
+            found += green_pixels.any()
+            if green_pixels.any():
+                self.assertGreater((labels[green_pixels] == static).mean(), 0.95)
+        self.assertGreater(found, 5)
+
+    def test_both_sources_are_drawn_from_and_none_needs_to_be_there(self):
+        mask = np.full((20, 20), 255, np.uint8)
+        thing = (np.zeros((20, 20, 3), np.uint8), mask)
+        picture = np.full((100, 100, 3), 9, np.uint8)
+        rng = np.random.default_rng(1)
+        drawn = [augmentation.Decoys([picture], [thing]).draw(rng) for _ in range(20)]
+        self.assertEqual({int(d[0].max()) for d in drawn}, {0, 9})
+        self.assertIsNone(NO_DECOYS.draw(rng))
+
+
 class Samples(unittest.TestCase):
     def setUp(self):
-        self.samples = mixture.Mixture([one_picture_set()], [red_person()], 3)
+        self.samples = mixture.Mixture([one_picture_set()], [red_person()], NO_DECOYS, 3)
 
     def test_a_sample_depends_on_seed_and_number_alone(self):
-        again = mixture.Mixture([one_picture_set()], [red_person()], 3)
+        again = mixture.Mixture([one_picture_set()], [red_person()], NO_DECOYS, 3)
         again[7]
         for number in (5, 0, 5):
             self.assertTrue(all(np.array_equal(a, b) for a, b in zip(self.samples[number], again[number])))
-        other = mixture.Mixture([one_picture_set()], [red_person()], 4)
+        other = mixture.Mixture([one_picture_set()], [red_person()], NO_DECOYS, 4)
         self.assertFalse(np.array_equal(self.samples[0][0], other[0][0]))
 
     def test_crops_have_the_size_and_known_labels(self):
@@ -125,6 +152,14 @@ class Readers(unittest.TestCase):
         for labels in data.labels:
             seen |= set(np.unique(labels))
         self.assertTrue({13, 18, label_set.set_number(label_set.PERSON), label_set.set_number(label_set.STATIC)} <= seen)
+
+    @unittest.skipUnless((SHARED / "segmentation/coco128").exists(), "no data at hand")
+    def test_coco_gives_things_that_do_not_move(self):
+        things = datasets.static_things(SHARED)
+        self.assertGreater(len(things), 100)
+        for picture, mask in things:
+            self.assertEqual(picture.shape[:2], mask.shape)
+            self.assertTrue(mask.any())
 
 
 if __name__ == "__main__":

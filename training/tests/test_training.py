@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from training.segmentation import checkpoint, evaluation, export, label_set, losses, mixture, networks, train
-from training.tests.test_data import one_picture_set, red_person
+from training.tests.test_data import NO_DECOYS, one_picture_set, red_person
 
 PROGRAM = os.environ.get("ROSLAM_PROGRAM", "")
 
@@ -129,7 +129,7 @@ class Training(unittest.TestCase):
         options = train.TrainingOptions(variant="wide-stem", steps=steps, batch=4, crop=64, workers=0, warm_up=2,
                                         save_every=3, validate_every=1000, precision="float", average=0.9,
                                         loss=losses.LossOptions())
-        with mock.patch.object(mixture, "training_sets", lambda *_: ([one_picture_set("camvid")], [red_person()])), \
+        with mock.patch.object(mixture, "training_sets", lambda *_: ([one_picture_set("camvid")], [red_person()], NO_DECOYS)), \
                 mock.patch.object(mixture, "validation_sets", lambda *_: []):
             return train.Trainer("", folder, options)
 
