@@ -2,6 +2,7 @@
 import dataclasses
 import json
 import os
+import re
 import subprocess
 import tempfile
 import unittest
@@ -12,7 +13,7 @@ import cv2
 import numpy as np
 import torch
 
-from training.segmentation import checkpoint, evaluation, export, label_set, losses, mixture, networks, train
+from training.segmentation import checkpoint, evaluation, export, figures, label_set, losses, mixture, networks, train
 from training.tests.test_data import NO_DECOYS, one_picture_set, red_person
 
 PROGRAM = os.environ.get("ROSLAM_PROGRAM", "")
@@ -120,6 +121,14 @@ class Schedule(unittest.TestCase):
         self.assertAlmostEqual(train.rate_at(500, options), 0.01)
         self.assertAlmostEqual(train.rate_at(900, options), 0.005)
         self.assertLess(train.rate_at(999, options), 1e-4)
+
+
+class Figures(unittest.TestCase):
+    def test_colours_are_those_of_the_program(self):
+        source = (Path(__file__).parents[2] / "roslam/semantics/label_set.cpp").read_text()
+        table = source[source.index("kColours{"):source.index("};", source.index("kColours{"))]
+        colours = [tuple(map(int, bgr))[::-1] for bgr in re.findall(r"Vec3b\((\d+), (\d+), (\d+)\)", table)]
+        self.assertEqual(colours, [tuple(map(int, colour)) for colour in figures.COLOURS])
 
 
 class Training(unittest.TestCase):
