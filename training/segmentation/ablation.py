@@ -8,7 +8,7 @@ import torch
 
 from training.segmentation import checkpoint, cost, evaluation, losses, mixture, networks, train
 
-SIZE = (288, 384)  # what the network sees of a 640x480 camera by default
+SIZE = (352, 480)  # what the network sees of a 640x480 camera by default
 
 
 def experiments():

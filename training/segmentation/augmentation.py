@@ -135,7 +135,7 @@ def decoy(rng, picture):
 
 
 def motion_blur(rng, picture):
-    length = int(rng.integers(3, 12))
+    length = int(log_uniform(rng, (3, 25)))  # pixels: a camera that turns fast blurs over a tenth of the picture
     kernel = np.zeros((length, length), np.float32)
     angle = rng.uniform(0, np.pi)
     offset = np.array([np.cos(angle), np.sin(angle)]) * (length - 1) / 2

@@ -7,6 +7,7 @@ import numpy as np
 from torch.utils import data
 
 from training.segmentation import augmentation, datasets, label_set
+from training.segmentation.clutter import Clutter
 
 @dataclass(frozen=True)
 class Share:
@@ -25,7 +26,8 @@ SHARES = {
     "people": Share(0.10, {"roll": 25.0}),
     "drone_people": Share(0.06),
     "coco128": Share(0.10, {"zoom": (0.9, 3.0), "roll": 30.0, "paste": 0.25, "decoys": 0.5}),
-    "rooms": Share(0.30, {"zoom": (0.9, 4.0), "roll": 45.0, "paste": 0.4, "decoys": 0.6}),
+    "clutter": Share(0.14, {"zoom": (0.9, 2.5), "roll": 45.0, "paste": 0.4, "decoys": 0.4}),
+    "rooms": Share(0.24, {"zoom": (0.9, 4.0), "roll": 45.0, "paste": 0.4, "decoys": 0.6}),
 }
 
 
@@ -35,6 +37,7 @@ def training_sets(folder, official_cityscapes=None, only=()):
                for name in ("cityscapes256", "camvid", "people", "drone_people")}
     readers["coco128"] = lambda: datasets.coco128(folder)
     readers["rooms"] = lambda: datasets.rooms(folder)
+    readers["clutter"] = Clutter
     if official_cityscapes:
         del readers["cityscapes256"]
         readers["cityscapes"] = lambda: datasets.cityscapes(official_cityscapes, "train")

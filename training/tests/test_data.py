@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from training.segmentation import augmentation, datasets, label_set, mixture
+from training.segmentation import augmentation, clutter, datasets, label_set, mixture
 
 NO_DECOYS = augmentation.Decoys([], [])
 SHARED = Path(os.environ.get("ROSLAM_TEST_DATA", "../shared/data"))
@@ -73,6 +73,21 @@ class DecoysInCrops(unittest.TestCase):
         drawn = [augmentation.Decoys([picture], [thing]).draw(rng) for _ in range(20)]
         self.assertEqual({int(d[0].max()) for d in drawn}, {0, 9})
         self.assertIsNone(NO_DECOYS.draw(rng))
+
+
+class MadeUpClutter(unittest.TestCase):
+    def test_a_picture_depends_on_its_number_alone_and_is_static(self):
+        data = clutter.Clutter()
+        picture, labels = data[3]
+        self.assertTrue(np.array_equal(picture, data[3][0]))
+        self.assertFalse(np.array_equal(picture, data[4][0]))
+        self.assertEqual(picture.shape, (*labels.shape, 3))
+        self.assertEqual(set(np.unique(labels)), {label_set.set_number(label_set.STATIC)})
+
+    def test_most_pictures_show_something(self):
+        data = clutter.Clutter()
+        spread = [float(data[i][0].std()) for i in range(12)]
+        self.assertGreater(np.median(spread), 10)
 
 
 class Samples(unittest.TestCase):
