@@ -5,7 +5,6 @@
 
 #include "apps/roslam/evaluate.hpp"
 #include "apps/roslam/output.hpp"
-#include "roslam/error.hpp"
 #include "roslam/evaluation/segmentation_error.hpp"
 
 namespace roslam::app {

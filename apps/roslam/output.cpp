@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/output.hpp"
 
-#include <cstdint>
 #include <cstdio>
 #include <iostream>
 #include <opencv2/imgcodecs.hpp>
-#include <vector>
 
 #include "roslam/error.hpp"
-#include "roslam/write_file.hpp"
+#include "roslam/sources/image_file.hpp"
 
 namespace roslam::app {
 
 void write_picture(const std::filesystem::path& file, const cv::Mat& picture) {
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(file.extension().string(), picture, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  write_image(file, picture, {cv::IMWRITE_PNG_COMPRESSION, 1});
 }
 
 void require_written_output() {

@@ -6,11 +6,10 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 
 #include "roslam/error.hpp"
 #include "roslam/evaluation/plot.hpp"
-#include "roslam/write_file.hpp"
+#include "roslam/sources/image_file.hpp"
 
 namespace roslam {
 
@@ -214,15 +213,7 @@ void write_png(const std::filesystem::path& file, const cv::Mat& image) {
   if (file.extension() != ".png") {
     throw OutputError(file.string() + ": figures are written as PNG; give a name that ends in .png");
   }
-  // Encoded in memory and then written: cv::imwrite does not notice a disk that is full.
-  std::vector<unsigned char> bytes;
-  bool encoded = false;
-  try {
-    encoded = cv::imencode(".png", image, bytes);
-  } catch (const cv::Exception&) {  // the same as false, with a message for programmers
-  }
-  if (!encoded) throw OutputError(file.string() + ": this OpenCV cannot write PNG; build it with libpng");
-  write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  write_image(file, image);
 }
 
 }  // namespace roslam

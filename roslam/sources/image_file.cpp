@@ -6,7 +6,9 @@
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
-#include <vector>
+
+#include "roslam/error.hpp"
+#include "roslam/write_file.hpp"
 
 namespace roslam {
 
@@ -61,6 +63,22 @@ cv::Mat depth_to_metres(const cv::Mat& raw, double units_per_metre) {
   cv::Mat metres;
   raw.convertTo(metres, CV_32FC1, 1.0 / units_per_metre);
   return metres;
+}
+
+void write_image(const std::filesystem::path& file, const cv::Mat& image,
+                 const std::vector<int>& parameters) {
+  // Encoded in memory and then written: cv::imwrite does not notice a disk that is full.
+  std::vector<unsigned char> bytes;
+  bool encoded = false;
+  try {
+    encoded = cv::imencode(file.extension().string(), image, bytes, parameters);
+  } catch (const cv::Exception&) {  // the same as false, with a message for programmers
+  }
+  if (!encoded) {
+    throw OutputError(file.string() +
+                      ": this OpenCV cannot write such images; build it with libpng and libjpeg");
+  }
+  write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace roslam

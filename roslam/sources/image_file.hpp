@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <string>
+#include <vector>
 
 namespace roslam {
 
@@ -22,6 +23,11 @@ ImageFile read_depth_image(const std::filesystem::path& file);
 
 /// Reads an image of labels, 8 bit and one channel, as CV_8UC1.
 ImageFile read_label_image(const std::filesystem::path& file);
+
+/// Writes an image in the format that the file's ending names. parameters: of cv::imencode. Throws
+/// OutputError if this OpenCV does not know the format or the file cannot be written in full.
+void write_image(const std::filesystem::path& file, const cv::Mat& image,
+                 const std::vector<int>& parameters = {});
 
 /// Raw depth units to CV_32FC1 metres; 0 stays 0 (unknown).
 cv::Mat depth_to_metres(const cv::Mat& raw, double units_per_metre);

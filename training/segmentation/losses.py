@@ -66,15 +66,19 @@ class SetCrossEntropy(torch.autograd.Function):
         return difference * gradient[:, None], None
 
 
+def members_by_label():
+    """256 x classes: for each label 1 where a class is in its set; void has them all."""
+    table = torch.from_numpy(label_set.membership())
+    return torch.cat([table, torch.ones(256 - len(table), table.shape[1])])
+
+
 class PixelLoss(torch.nn.Module):
     """Loss of each pixel against a set of classes, zero where void: N x h x w."""
 
     def __init__(self, form="cross-entropy"):
         super().__init__()
         self.form = form
-        table = torch.from_numpy(label_set.membership())
-        void = torch.ones(256 - len(table), table.shape[1])
-        self.register_buffer("members", torch.cat([table, void]), persistent=False)
+        self.register_buffer("members", members_by_label(), persistent=False)
 
     def forward(self, scores, labels):
         members = self.members[labels.reshape(-1).long()]
@@ -100,8 +104,7 @@ class SoftJaccard(torch.nn.Module):
 
     def __init__(self):
         super().__init__()
-        table = torch.from_numpy(label_set.membership())
-        self.register_buffer("members", torch.cat([table, torch.ones(256 - len(table), table.shape[1])]), persistent=False)
+        self.register_buffer("members", members_by_label(), persistent=False)
 
     def forward(self, scores, labels):
         labels = labels[:, ::2, ::2].reshape(-1).long()

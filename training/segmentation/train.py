@@ -184,7 +184,8 @@ class Trainer:
     def restore(self, content):
         self.network.load_state_dict(content["network"])
         self.average.network.load_state_dict(content["average"])
-        if content["training_options"].get("optimiser") == self.options.optimiser:  # another starts with what it can
+        # Another optimiser cannot use what the one before it remembered, and starts afresh.
+        if content["training_options"].get("optimiser") == self.options.optimiser:
             for mine, saved in zip(self.optimisers, content["optimisers"]):
                 mine.load_state_dict(saved)
         self.step = content["step"]

@@ -203,6 +203,9 @@ class Program(unittest.TestCase):
 
     def test_labels_are_those_of_pytorch(self):
         network = random_network()
+        with torch.no_grad():  # the classes made alike on average, or one would win nearly everywhere
+            mean = network(evaluation.network_input(next(self.pictures())[1])).mean((0, 2, 3))
+            network.classifier.bias -= mean
         export.export(network, self.root / "net.onnx")
         (self.root / "in").mkdir()
         pictures = dict(self.pictures())
@@ -213,7 +216,7 @@ class Program(unittest.TestCase):
         for name, picture in pictures.items():
             expected = evaluation.predict(network, picture[..., ::-1].copy())
             labels = cv2.imread(str(self.root / "out" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
-            self.assertGreater(len(np.unique(expected)), 1)  # or the comparison would say nothing
+            self.assertGreater(len(np.unique(expected)), 2)  # or the comparison would say nothing
             equal += (labels == expected).sum()
             total += labels.size
         self.assertGreaterEqual(equal / total, 0.995)
