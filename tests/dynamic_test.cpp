@@ -67,6 +67,9 @@ TEST_F(DynamicRun, RefusesABadModelAndUnknownModes) {
                  {"eleven.onnx", "11 classes"});
   expect_refused(run("--dynamic labels --model none.onnx"), {"none.onnx: no such model file"});
   EXPECT_EQ(run("--dynamic magic").code, 2);
+  const Outcome unused = run("--model none.onnx");
+  EXPECT_EQ(unused.code, 2);
+  EXPECT_NE(unused.error.find("--model: needs --dynamic labels"), std::string::npos) << unused.error;
 }
 
 TEST_F(DynamicRun, WithoutWeightsItSaysOnceThatNothingIsRemoved) {

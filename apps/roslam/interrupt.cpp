@@ -4,6 +4,7 @@
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/signalfd.h>
+#include <ucontext.h>
 #include <unistd.h>
 
 #include <array>
@@ -20,11 +21,23 @@ sigset_t watched_signals() {
   sigaddset(&set, SIGTERM);
   return set;
 }
+
+/// Libraries (OpenBLAS is one) start threads before main() that do not block the signals, and the kernel may
+/// give one of them what is meant for the watcher. Such a thread passes it on and takes none from then on.
+void pass_on(int signal, siginfo_t* /*info*/, void* context) {
+  sigaddset(&static_cast<ucontext_t*>(context)->uc_sigmask, signal);
+  kill(getpid(), signal);
+}
 }  // namespace
 
 InterruptWatcher::InterruptWatcher() {
   const sigset_t set = watched_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  struct sigaction passing {};
+  passing.sa_sigaction = pass_on;
+  passing.sa_flags = SA_SIGINFO | SA_RESTART;
+  sigaction(SIGINT, &passing, &interrupt_before_);
+  sigaction(SIGTERM, &passing, &terminate_before_);
   signals_ = signalfd(-1, &set, SFD_CLOEXEC);
   leave_ = eventfd(0, EFD_CLOEXEC);
   thread_ = std::jthread([this] { watch(); });
@@ -35,6 +48,8 @@ InterruptWatcher::~InterruptWatcher() {
   if (write(leave_, &one, sizeof(one)) == sizeof(one)) thread_.join();
   close(signals_);
   close(leave_);
+  sigaction(SIGINT, &interrupt_before_, nullptr);
+  sigaction(SIGTERM, &terminate_before_, nullptr);
   const sigset_t set = watched_signals();
   pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
 }

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <csignal>
 #include <stop_token>
 #include <thread>
 
 namespace roslam::app {
 
-/// Turns ctrl-C and a termination request into a stop token. Make one before any other thread starts: it
-/// keeps the signals from interrupting them. A second ctrl-C ends the program at once.
+/// Turns ctrl-C and a termination request into a stop token, also where libraries have started threads
+/// already. A second ctrl-C ends the program at once.
 class InterruptWatcher {
  public:
   InterruptWatcher();
@@ -21,6 +22,8 @@ class InterruptWatcher {
   void watch();
 
   std::stop_source stop_;
+  struct sigaction interrupt_before_ {};  // what the signals did before, and do again afterwards
+  struct sigaction terminate_before_ {};
   int signals_ = -1;  // file descriptor the signals arrive at
   int leave_ = -1;    // file descriptor that ends the thread
   std::jthread thread_;

@@ -96,6 +96,9 @@ void execute(const RunArguments& arguments, const std::string& version) {
   }
   if (arguments.source.name.empty()) throw CLI::RequiredError("SOURCE");
   if (arguments.out.empty()) throw CLI::RequiredError("--out");
+  if (!arguments.model.empty() && arguments.dynamic != "labels") {
+    throw CLI::ValidationError("--model", "needs --dynamic labels");
+  }
   const InterruptWatcher interrupt;
   const auto source = open_source(arguments.source);
   const RunFolder folder(arguments.out);
