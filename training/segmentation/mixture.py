@@ -20,14 +20,14 @@ class Share:
 # The 256x256 copy of Cityscapes is squashed from 2:1, so it is stretched to anything from that to natural. What is seen
 # indoors is seen from everywhere: close up, and with the camera turned about its axis.
 SHARES = {
-    "cityscapes256": Share(0.45, {"stretch": (0.9, 2.1), "paste": 0.12}),
-    "cityscapes": Share(0.45, {"paste": 0.12}),
+    "cityscapes256": Share(0.38, {"stretch": (0.9, 2.1), "paste": 0.12}),
+    "cityscapes": Share(0.38, {"paste": 0.12}),
     "camvid": Share(0.17, {"paste": 0.12}),
-    "people": Share(0.10, {"roll": 25.0}),
-    "drone_people": Share(0.06),
+    "people": Share(0.13, {"roll": 25.0}),
+    "drone_people": Share(0.08),
     "coco128": Share(0.10, {"zoom": (0.9, 3.0), "roll": 30.0, "paste": 0.25, "decoys": 0.5}),
-    "clutter": Share(0.14, {"zoom": (0.9, 2.5), "roll": 45.0, "paste": 0.4, "decoys": 0.4}),
-    "rooms": Share(0.24, {"zoom": (0.9, 4.0), "roll": 45.0, "paste": 0.4, "decoys": 0.6}),
+    "clutter": Share(0.16, {"zoom": (0.9, 2.5), "roll": 45.0, "paste": 0.3, "decoys": 0.4}),
+    "rooms": Share(0.26, {"zoom": (0.9, 4.0), "roll": 45.0, "paste": 0.4, "decoys": 0.6}),
 }
 
 

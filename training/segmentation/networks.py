@@ -30,16 +30,20 @@ class NetworkOptions:
     narrow: tuple = (16, 32, 64)  # inner channels of their bottlenecks
     units: tuple = (4, 8, 4)  # bottlenecks in each
     block5_stride: int = 32  # of the image; 8 is reached by dilation
+    context_units: int = 0  # bottlenecks at twice block 5's stride, whose features are added to block 5's
     pyramid: str = "bins"  # "bins": 1, 2, 3, 6 cells a side as in PSPNet; "any-size": windows of fixed size; "none"
     pyramid_width: int = 64  # channels of each level
     head: str = "full"  # 3x3 convolution that joins the pyramid: "full" or "separable"
     head_width: int = 128
     decoder: bool = False  # joins features of strides 8 and 4
+    refine_units: int = 0  # residual separable convolutions after each join of the decoder
     sub_pixel: bool = False  # 2x2 scores a cell: twice the resolution for the price of channels
 
     def validate(self):
         if self.block5_stride not in (8, 16, 32):
             raise ValueError("block5_stride must be 8, 16 or 32")
+        if self.context_units and self.block5_stride == 32:
+            raise ValueError("context_units need block5_stride 8 or 16")
         if self.pyramid not in ("bins", "any-size", "none"):
             raise ValueError("pyramid must be bins, any-size or none")
         if self.head not in ("full", "separable"):
@@ -56,6 +60,8 @@ def variants():
     decoder = replace(stem, decoder=True)
     sub_pixel = replace(decoder, stride4_units=1, sub_pixel=True)
     wide = replace(sub_pixel, narrow=(32, 64, 128), head_width=96)
+    context = replace(wide, context_units=4)
+    refined = replace(context, refine_units=1)
     return {
         "table2": table2,
         "table2-plain-pool": replace(table2, pyramid="none"),
@@ -65,7 +71,9 @@ def variants():
         "wide-stem": stem,
         "decoder": decoder,
         "sub-pixel": sub_pixel,
-        "roslam-pspnet": wide,
+        "wide-bottlenecks": wide,
+        "context": context,
+        "roslam-pspnet": refined,
     }
 
 
@@ -100,6 +108,31 @@ class Bottleneck(nn.Module):
     def forward(self, x):
         y = self.layers(x)
         return functional.relu(x + y if self.has_residual else y)
+
+
+class Residual(nn.Module):
+    """Adds to its input what layers make of it. At first that is nothing: a trained network that is given one goes on
+    from where it was."""
+
+    def __init__(self, layers):
+        super().__init__()
+        self.layers = layers
+        last = [m for m in layers.modules() if isinstance(m, nn.BatchNorm2d)][-1]
+        nn.init.zeros_(last.weight)
+
+    def forward(self, x):
+        return functional.relu(x + self.layers(x))
+
+
+def context(width, units):
+    """What surrounds each cell, seen at half the size."""
+    return Residual(nn.Sequential(block(width, width, width, units, 2), conv(width, width, relu=False),
+                                  nn.Upsample(scale_factor=2.0, mode="bilinear", align_corners=False)))
+
+
+def refine(inputs, outputs, units):
+    more = (Residual(separable(outputs, outputs, relu=False)) for _ in range(units))
+    return nn.Sequential(*separable(inputs, outputs), *more)
 
 
 def block(inputs, narrow, outputs, units, stride, dilation=1):
@@ -205,6 +238,8 @@ class PSPNet(nn.Module):
         self.block5 = nn.Sequential(
             *(Bottleneck(w4 if i == 0 else w5, n5, w5, 2 if i < halvings else 1, dilation)
               for i in range(options.units[2])))
+        if options.context_units:
+            self.block5.add_module("context", context(w5, options.context_units))
         self.pyramid = self.PYRAMIDS[options.pyramid](w5, options.pyramid_width)
         joined = self.pyramid.outputs
         if options.head == "full":
@@ -213,9 +248,9 @@ class PSPNet(nn.Module):
             self.head = nn.Sequential(conv(joined, options.head_width), separable(options.head_width, options.head_width))
         if options.decoder:
             self.join8 = conv(w4, options.head_width, relu=False)
-            self.refine8 = separable(options.head_width, options.head_width // 2)
+            self.refine8 = refine(options.head_width, options.head_width // 2, options.refine_units)
             self.join4 = conv(width4, options.head_width // 2, relu=False)
-            self.refine4 = separable(options.head_width // 2, options.head_width // 2)
+            self.refine4 = refine(options.head_width // 2, options.head_width // 2, options.refine_units)
         last = options.head_width // 2 if options.decoder else options.head_width
         if options.sub_pixel:
             self.classifier = SubPixelClassifier(last, options.classes)

@@ -56,6 +56,21 @@ class Networks(unittest.TestCase):
         network = networks.PSPNet(networks.variants()["roslam-pspnet"])
         self.assertLess(networks.parameters_in_inference(network), 1.5e6)
 
+    def test_what_is_added_starts_as_nothing(self):
+        small = random_network("wide-bottlenecks")
+        grown = networks.PSPNet(networks.variants()["roslam-pspnet"])
+        self.assertGreater(networks.load_matching(grown, small.state_dict()), 0)
+        picture = torch.rand(1, 3, 64, 96)
+        with torch.no_grad():
+            torch.testing.assert_close(grown.eval()(picture), small(picture), rtol=0, atol=0)
+
+    def test_what_is_added_learns(self):
+        network = networks.PSPNet(networks.variants()["roslam-pspnet"]).train()
+        network(torch.rand(2, 3, 64, 96))[0].square().sum().backward()
+        for part in (network.block5.context, network.refine8[-1], network.refine4[-1]):
+            last = [m for m in part.modules() if isinstance(m, torch.nn.BatchNorm2d)][-1]
+            self.assertGreater(float(last.weight.grad.abs().sum()), 0)
+
     def test_sub_pixel_scores_are_the_same_in_training(self):
         classifier = networks.SubPixelClassifier(8, 19)
         x = torch.randn(2, 8, 5, 7)
