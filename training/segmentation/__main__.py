@@ -40,8 +40,9 @@ def training_options(arguments):
 def run_train(arguments):
     if arguments.processes > 1 and "RANK" not in os.environ:
         return processes.start(arguments.processes, sys.argv[1:])
-    train.Trainer(arguments.data, arguments.out, training_options(arguments), arguments.cityscapes,
-                  arguments.start_from).run()
+    options = training_options(arguments)
+    source = mixture.training_data(arguments.data, arguments.cityscapes, options.only)
+    train.Trainer(source, arguments.out, options, arguments.start_from).run()
     return 0
 
 

@@ -4,8 +4,6 @@ import dataclasses
 import json
 from pathlib import Path
 
-import torch
-
 from training.segmentation import checkpoint, cost, evaluation, losses, mixture, networks, train
 
 SIZE = (352, 480)  # what the network sees of a 640x480 camera by default
@@ -26,27 +24,41 @@ def experiments():
 
 
 def run(data_folder, out, options, names=()):
-    """Trains what is not trained yet and writes ablation.json and ablation.md into out."""
+    """Trains and scores what is not yet, and writes ablation.json and ablation.md into out. Several calls with different
+    names may share a folder; one with all names then joins their scores."""
     out = Path(out)
-    validation = mixture.validation_sets(data_folder)
+    chosen = {name: e for name, e in experiments().items() if not names or name in names}
+    is_scored = [(folder_of(out, name) / "scores.json").exists() for name in chosen]
+    source = None if all(is_scored) else mixture.training_data(data_folder, only=options.only)
     rows = []
-    for name, (variant, changes) in experiments().items():
-        if names and name not in names:
-            continue
-        folder = out / name.replace(" ", "-")
-        trainer = train.Trainer(data_folder, folder, dataclasses.replace(options, variant=variant, **changes))
-        if trainer.step < options.steps:
-            trainer.run()
-            if trainer.stopped:
-                break
-        network = checkpoint.load_network(folder / "last.pt")
-        threads = torch.get_num_threads()
-        torch.set_num_threads(1)
-        rows.append({"name": name, "steps": options.steps, **cost.measure(network, SIZE), **evaluation.score_all(network, validation)})
-        torch.set_num_threads(threads)
+    for name, (variant, changes) in chosen.items():
+        folder = folder_of(out, name)
+        changed = dataclasses.replace(options, variant=variant, **changes)
+        scores = trained_and_scored(source, folder, changed)
+        if scores is None:
+            break
+        rows.append({"name": name, **scores, **cost.measure(checkpoint.load_network(folder / "last.pt"), SIZE)})
         (out / "ablation.json").write_text(json.dumps(rows, indent=1))
         (out / "ablation.md").write_text(markdown(rows))
     return rows
+
+
+def folder_of(out, name):
+    return out / name.replace(" ", "-")
+
+
+def trained_and_scored(source, folder, options):
+    """The scores of one experiment, from its folder if they are there; None if its training was stopped."""
+    file = folder / "scores.json"
+    if not file.exists():
+        trainer = train.Trainer(dataclasses.replace(source, validation=()), folder, options)
+        if trainer.step < options.steps:
+            trainer.run()
+        if trainer.stopped:
+            return None
+        scores = evaluation.score_all(checkpoint.load_network(folder / "last.pt"), source.validation)
+        file.write_text(json.dumps({"steps": options.steps, **scores}))
+    return json.loads(file.read_text())
 
 
 def markdown(rows):

@@ -31,8 +31,19 @@ SHARES = {
 }
 
 
-def training_sets(folder, official_cityscapes=None, only=()):
-    """Everything to train on, the people to paste, and things that are none. only: names to keep; empty = all."""
+@dataclass(frozen=True)
+class TrainingData:
+    """What several runs may share: datasets to train on, people to paste into them, decoys that are none, and pairs
+    of a dataset and a grouping to validate on."""
+
+    sets: list
+    people: list
+    decoys: augmentation.Decoys
+    validation: list = ()
+
+
+def training_data(folder, official_cityscapes=None, only=()):
+    """Reads it. only: names of datasets to train on; empty = all."""
     readers = {name: lambda name=name: getattr(datasets, name)(folder, "train")
                for name in ("cityscapes256", "camvid", "people", "drone_people")}
     readers["coco128"] = lambda: datasets.coco128(folder)
@@ -43,7 +54,8 @@ def training_sets(folder, official_cityscapes=None, only=()):
         readers["cityscapes"] = lambda: datasets.cityscapes(official_cityscapes, "train")
     sets = [read() for name, read in readers.items() if not only or name in only]
     rooms = [picture for s in sets if s.name == "rooms" for picture in s.pictures]
-    return sets, datasets.cutouts(folder, "train"), augmentation.Decoys(rooms, datasets.static_things(folder))
+    decoys = augmentation.Decoys(rooms, datasets.static_things(folder))
+    return TrainingData(sets, datasets.cutouts(folder, "train"), decoys, validation_sets(folder))
 
 
 class Mixture(data.Dataset):

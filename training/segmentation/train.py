@@ -150,18 +150,17 @@ class Log:
 
 
 class Trainer:
-    """Everything a run holds: made anew or from the checkpoint in its folder."""
+    """Everything a run holds: made anew or from the checkpoint in its folder. source: mixture.TrainingData."""
 
-    def __init__(self, data_folder, out, options, cityscapes=None, start_from=None):
+    def __init__(self, source, out, options, start_from=None):
         options.validate()
         self.options, self.out = options, Path(out)
         self.processes = Processes()
         self.out.mkdir(parents=True, exist_ok=True)
         self.log = Log(self.out / "log.jsonl", self.processes.rank == 0)
-        sets, people, decoys = mixture.training_sets(data_folder, cityscapes, options.only)
         crops = dataclasses.replace(mixture.augmentation.AugmentationOptions(), crop=options.crop)
-        self.samples = mixture.Mixture(sets, people, decoys, options.seed, crops)
-        self.validation = mixture.validation_sets(data_folder) if self.processes.rank == 0 else []
+        self.samples = mixture.Mixture(source.sets, source.people, source.decoys, options.seed, crops)
+        self.validation = source.validation if self.processes.rank == 0 else ()
         torch.manual_seed(options.seed)
         network = networks.PSPNet(networks.variants()[options.variant])
         self.network = network.to(self.processes.device, memory_format=torch.channels_last)

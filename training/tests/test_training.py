@@ -7,7 +7,6 @@ import subprocess
 import tempfile
 import unittest
 from pathlib import Path
-from unittest import mock
 
 import cv2
 import numpy as np
@@ -153,9 +152,8 @@ class Training(unittest.TestCase):
         options = train.TrainingOptions(variant="wide-stem", steps=steps, batch=4, crop=64, workers=0, warm_up=2,
                                         save_every=3, validate_every=1000, precision="float", average=0.9,
                                         loss=losses.LossOptions())
-        with mock.patch.object(mixture, "training_sets", lambda *_: ([one_picture_set("camvid")], [red_person()], NO_DECOYS)), \
-                mock.patch.object(mixture, "validation_sets", lambda *_: []):
-            return train.Trainer("", folder, options)
+        source = mixture.TrainingData([one_picture_set("camvid")], [red_person()], NO_DECOYS)
+        return train.Trainer(source, folder, options)
 
     def test_loss_falls(self):
         with tempfile.TemporaryDirectory() as folder:
