@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from training.segmentation import label_set
+from training.segmentation import clutter, label_set
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,7 @@ class AugmentationOptions:
     paste_up_to: int = 3  # people
     near: float = 0.5  # share of pasted people that are larger than the crop is high or cut by its border
     decoys: float = 0.0  # probability that things are pasted in that are no people, so that an edge makes no person
+    things: float = 0.0  # probability that made-up things stand in front of everything
     hide: float = 0.35  # probability that something hides a part of a pasted person
     grey: float = 0.05  # probabilities of what the camera does
     blur: float = 0.3
@@ -201,4 +202,7 @@ def augment(rng, picture, labels, people, decoys, options):
         pasted += [(*people[rng.integers(len(people))], label_set.PERSON[0]) for _ in range(count)]
     for number in rng.permutation(len(pasted)):
         paste_cutout(rng, picture, labels, *pasted[number], options)
+    if rng.random() < options.things:
+        for _ in range(int(rng.integers(1, 6))):
+            labels[clutter.place(rng, picture, *clutter.thing(rng, options.crop))] = label_set.set_number(label_set.STATIC)
     return camera(rng, picture, options), labels

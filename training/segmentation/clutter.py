@@ -61,7 +61,7 @@ def thing(rng, side):
 
 
 def place(rng, picture, surface, mask):
-    """Draws a thing anywhere, seen at a slant."""
+    """Draws a thing anywhere, seen at a slant; returns where it lies, (side, side) booleans."""
     side = picture.shape[0]
     height, width = mask.shape
     corners = np.float32([(0, 0), (width, 0), (width, height), (0, height)])
@@ -78,6 +78,7 @@ def place(rng, picture, surface, mask):
     drawn = cv2.warpPerspective(surface, matrix, (side, side))
     inside = cv2.warpPerspective(mask, matrix, (side, side), flags=cv2.INTER_NEAREST) > 0
     picture[inside] = drawn[inside]
+    return inside
 
 
 def cable(rng, picture):

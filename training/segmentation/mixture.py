@@ -23,11 +23,11 @@ SHARES = {
     "cityscapes256": Share(0.38, {"stretch": (0.9, 2.1), "paste": 0.12}),
     "cityscapes": Share(0.38, {"paste": 0.12}),
     "camvid": Share(0.17, {"paste": 0.12}),
-    "people": Share(0.13, {"roll": 25.0}),
+    "people": Share(0.13, {"roll": 25.0, "things": 0.3}),
     "drone_people": Share(0.08),
-    "coco128": Share(0.10, {"zoom": (0.9, 3.0), "roll": 30.0, "paste": 0.25, "decoys": 0.5}),
-    "clutter": Share(0.16, {"zoom": (0.9, 2.5), "roll": 45.0, "paste": 0.3, "decoys": 0.4}),
-    "rooms": Share(0.26, {"zoom": (0.9, 4.0), "roll": 45.0, "paste": 0.4, "decoys": 0.6}),
+    "coco128": Share(0.10, {"zoom": (0.9, 3.0), "roll": 30.0, "paste": 0.25, "decoys": 0.5, "things": 0.3}),
+    "clutter": Share(0.16, {"zoom": (0.9, 2.5), "roll": 45.0, "paste": 0.3, "decoys": 0.4, "things": 0.6}),
+    "rooms": Share(0.26, {"zoom": (0.9, 4.0), "roll": 45.0, "paste": 0.4, "decoys": 0.6, "things": 0.5}),
 }
 
 

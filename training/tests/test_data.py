@@ -75,6 +75,20 @@ class DecoysInCrops(unittest.TestCase):
         self.assertIsNone(NO_DECOYS.draw(rng))
 
 
+class ThingsInFront(unittest.TestCase):
+    def test_what_they_cover_is_static_and_the_rest_stays(self):
+        nothing = {"hide": 0.0, "grey": 0.0, "blur": 0.0, "noise": 0.0, "compression": 0.0}
+        static = label_set.set_number(label_set.STATIC)
+        covered = 0
+        for seed in range(10):
+            crops = [augmentation.augment(np.random.default_rng(seed), *one_picture_set()[0], [], NO_DECOYS,
+                                          augmentation.AugmentationOptions(things=share, **nothing)) for share in (0, 1)]
+            is_changed = crops[0][1] != crops[1][1]
+            covered += is_changed.any()
+            self.assertTrue((crops[1][1][is_changed] == static).all())
+        self.assertGreater(covered, 5)
+
+
 class MadeUpClutter(unittest.TestCase):
     def test_a_picture_depends_on_its_number_alone_and_is_static(self):
         data = clutter.Clutter()
