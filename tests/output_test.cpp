@@ -129,8 +129,13 @@ class Interrupt : public Dataset, public testing::WithParamInterface<const char*
     std::vector<char*> pointers;
     for (auto& word : words) pointers.push_back(word.data());
     pointers.push_back(nullptr);
+    std::vector<char*> variables;
+    for (char** variable = environ; *variable != nullptr; ++variable) variables.push_back(*variable);
+    std::string preload = "LD_PRELOAD=" ROSLAM_TEST_EARLY_THREAD;
+    variables.push_back(preload.data());
+    variables.push_back(nullptr);
     pid_t process = -1;
-    EXPECT_EQ(posix_spawn(&process, ROSLAM_PROGRAM, &files, nullptr, pointers.data(), environ), 0);
+    EXPECT_EQ(posix_spawn(&process, ROSLAM_PROGRAM, &files, nullptr, pointers.data(), variables.data()), 0);
     posix_spawn_file_actions_destroy(&files);
     return process;
   }
