@@ -50,6 +50,7 @@ void register_segmentation_benchmarks(const std::shared_ptr<RenderedFlight>& fli
         ->Arg(256)
         ->Arg(320)
         ->Arg(384)
+        ->Arg(416)
         ->Arg(480)
         ->Arg(512)
         ->Arg(640);

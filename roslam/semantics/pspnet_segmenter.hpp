@@ -12,7 +12,7 @@ namespace roslam {
 
 struct SegmenterOptions {
   int working_side =
-      480;  ///< pixels, longer side of the picture the network sees; less is faster, more is finer
+      416;  ///< pixels, longer side of the picture the network sees; less is faster, more is finer
 
   /// Throws OptionsError naming the field.
   void validate() const;
