@@ -229,6 +229,8 @@ TEST(BadModel, IsNamedWithWhatWasExpected) {
   EXPECT_NE(classes.find("eleven.onnx: gives 11 classes where the 19"), std::string::npos) << classes;
   const std::string channels = reason_to_refuse(test_model("grey.onnx"));
   EXPECT_NE(channels.find("grey.onnx: the network cannot be run"), std::string::npos) << channels;
+  const std::string numbers = reason_to_refuse(test_model("nan.onnx"));
+  EXPECT_NE(numbers.find("nan.onnx: gives scores that are no numbers"), std::string::npos) << numbers;
 }
 
 TEST(BadModel, DamagedFilesAreRefusedAtAnyLength) {

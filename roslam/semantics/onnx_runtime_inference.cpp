@@ -44,7 +44,12 @@ class OnnxRuntimeInference : public Inference {
       const char* input_name = input_name_.c_str();
       const char* output_name = output_name_.c_str();
       outputs_ = session_.Run(Ort::RunOptions(nullptr), &input_name, &picture, 1, &output_name, 1);
-      const auto sizes = outputs_.front().GetTensorTypeAndShapeInfo().GetShape();
+      const auto result = outputs_.front().GetTensorTypeAndShapeInfo();
+      if (result.GetElementType() != ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT) {
+        throw ModelError(model_.string() +
+                         ": gives no 32-bit scores; install the model that belongs to this version");
+      }
+      const auto sizes = result.GetShape();
       const std::vector<int> size(sizes.begin(), sizes.end());
       return {static_cast<int>(size.size()), size.data(), CV_32F,
               outputs_.front().GetTensorMutableData<float>()};

@@ -56,7 +56,9 @@ PspnetSegmenter::PspnetSegmenter(const std::filesystem::path& model, const Segme
   inference_ = load_inference(model, backend);
   const int size[] = {1, 3, 2 * kSizeMultiple,
                       2 * kSizeMultiple};  // a first look: has it the shape we expect?
-  scores_for(cv::Mat(4, size, CV_32F, cv::Scalar(0)));
+  if (!cv::checkRange(scores_for(cv::Mat(4, size, CV_32F, cv::Scalar(0))))) {
+    throw ModelError(model_.string() + ": gives scores that are no numbers; install the model again");
+  }
 }
 
 cv::Mat PspnetSegmenter::scores_for(const cv::Mat& blob) {

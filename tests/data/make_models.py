@@ -3,6 +3,7 @@
 
 colours.onnx        19 classes: red is person, green vegetation, blue sky, white car, black road; a quarter of the size
 eleven.onnx         the same with 11 classes
+nan.onnx            gives no numbers
 grey.onnx           wants pictures of one channel
 """
 import numpy as np
@@ -10,7 +11,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 
-def network(file, classes, channels=3):
+def network(file, classes, channels=3, extra=0):
     """Averages 4x4 pixels, then scores each class by the colour."""
     weights = np.zeros((classes, channels, 1, 1), np.float32)
     bias = np.full(classes, -10, np.float32)
@@ -19,6 +20,7 @@ def network(file, classes, channels=3):
         if label < classes:
             weights[label, :, 0, 0] = 4 * np.array(colour)[:channels]
             bias[label] = -2 * sum(colour)
+    bias += np.float32(extra)
     nodes = [helper.make_node("AveragePool", ["image"], ["coarse"], kernel_shape=[4, 4], strides=[4, 4]),
              helper.make_node("Conv", ["coarse", "weights", "bias"], ["scores"], kernel_shape=[1, 1])]
     graph = helper.make_graph(
@@ -33,4 +35,5 @@ def network(file, classes, channels=3):
 
 network("colours.onnx", 19)
 network("eleven.onnx", 11)
+network("nan.onnx", 19, extra=np.nan)
 network("grey.onnx", 19, 1)

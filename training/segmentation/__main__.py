@@ -134,7 +134,7 @@ def main():
     arguments = parser.parse_args()
     try:
         return arguments.run(arguments) or 0
-    except (DataError, ValueError) as error:
+    except (DataError, ValueError, ArithmeticError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
 

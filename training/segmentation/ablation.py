@@ -27,6 +27,9 @@ def run(data_folder, out, options, names=()):
     """Trains and scores what is not yet, and writes ablation.json and ablation.md into out. Several calls with different
     names may share a folder; one with all names then joins their scores."""
     out = Path(out)
+    unknown = set(names) - set(experiments())
+    if unknown:
+        raise ValueError(f"{', '.join(sorted(unknown))}: no such experiment; there are {', '.join(experiments())}")
     chosen = {name: e for name, e in experiments().items() if not names or name in names}
     is_scored = [(folder_of(out, name) / "scores.json").exists() for name in chosen]
     source = None if all(is_scored) else mixture.training_data(data_folder, only=options.only)

@@ -19,11 +19,16 @@ NAMES = {"cityscapes256": "Cityscapes, mean of 8 groups", "camvid": "CamVid, mea
 
 def read_log(file):
     try:
-        return [json.loads(line) for line in Path(file).read_text().splitlines() if line.strip()]
+        lines = Path(file).read_text().splitlines()
     except FileNotFoundError:
         raise DataError(f"{file}: no such log; give the folder of a training run") from None
-    except json.JSONDecodeError as error:
-        raise DataError(f"{file}: line {error.lineno} is damaged; remove it") from None
+    entries = []
+    for number, line in enumerate(lines, 1):
+        try:
+            entries += [json.loads(line)] if line.strip() else []
+        except json.JSONDecodeError:
+            raise DataError(f"{file}: line {number} is damaged; remove it") from None
+    return entries
 
 
 def convergence(run, out):

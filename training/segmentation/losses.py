@@ -171,8 +171,8 @@ class DeepSupervision(torch.nn.Module):
         head_decay holds small."""
         main, *hidden = (o.float() for o in outputs)
         loss = self.main(main, labels)
-        if self.options.auxiliary:
-            loss = loss + self.options.auxiliary * sum(self.hidden(h, labels) for h in hidden)
+        # Also with a weight of 0: processes that train together need a gradient for every weight.
+        loss = loss + self.options.auxiliary * sum(self.hidden(h, labels) for h in hidden)
         if self.options.jaccard:
             loss = loss + self.options.jaccard * self.jaccard(main, labels_at(labels, main.shape[2:]))
         if self.options.head_decay:

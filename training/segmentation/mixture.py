@@ -53,8 +53,7 @@ def training_data(folder, official_cityscapes=None, only=()):
         del readers["cityscapes256"]
         readers["cityscapes"] = lambda: datasets.cityscapes(official_cityscapes, "train")
     sets = [read() for name, read in readers.items() if not only or name in only]
-    rooms = [picture for s in sets if s.name == "rooms" for picture in s.pictures]
-    decoys = augmentation.Decoys(rooms, datasets.static_things(folder))
+    decoys = augmentation.Decoys(static_pictures(sets), datasets.static_things(folder))
     return TrainingData(sets, datasets.cutouts(folder, "train"), decoys, validation_sets(folder))
 
 
@@ -87,6 +86,13 @@ def set_shares(mixture, samples=400):
         counts += np.bincount(mixture[index][1].ravel(), minlength=256)
     counts = counts[:len(label_set.SETS)]
     return counts / max(counts.sum(), 1)
+
+
+def static_pictures(sets):
+    """The pictures known to show nothing that moves; before some house fronts stand cars."""
+    static = label_set.set_number(label_set.STATIC)
+    return [picture for s in sets if s.name == "rooms" for picture, labels in zip(s.pictures, s.labels)
+            if (labels == static).all()]
 
 
 def validation_sets(folder):

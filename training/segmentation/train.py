@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import json
+import math
 import os
 import platform
 import signal
@@ -213,6 +214,10 @@ class Trainer:
         with half_precision(device, options.precision):
             outputs = network(images)
         loss = self.loss(outputs, labels.to(device, non_blocking=True), self.head_weights())
+        value = float(loss.detach())
+        if not math.isfinite(value):
+            raise ArithmeticError(f"the loss of step {self.step} is {value}; go on from {self.out / 'last.pt'} with a "
+                                  "lower --learning-rate")
         self.network.zero_grad(set_to_none=True)
         self.scaler.scale(loss).backward()
         for each in self.optimisers:
@@ -223,7 +228,7 @@ class Trainer:
         self.scaler.update()
         self.average.update(self.network, self.step)
         self.step += 1
-        return float(loss.detach()), rate
+        return value, rate
 
     def head_weights(self):
         return [self.network.classifier.weight, self.network.auxiliary4[-1].weight, self.network.auxiliary5[-1].weight]
@@ -243,14 +248,15 @@ class Trainer:
                 self.log.write(step=self.step, loss=sum(losses_since) / len(losses_since), rate=rate,
                                seconds=(time.monotonic() - begin) / len(losses_since))
                 begin, losses_since = time.monotonic(), []
-            self.stopped = self.processes.any(self.stopped)
-            is_last = self.stopped or self.step == self.options.steps
+            # Asked once a step: all processes have to agree, and a request that comes later waits for the next step.
+            is_stopped = self.processes.any(self.stopped)
+            is_last = is_stopped or self.step == self.options.steps
             if is_last or self.step % self.options.save_every == 0:
                 self.save()
             if self.step % self.options.validate_every == 0 or self.step == self.options.steps:
                 self.validate()
                 begin = time.monotonic()
-            if self.stopped:
+            if is_stopped:
                 break
         self.log.write(event="stopped" if self.step < self.options.steps else "end", step=self.step)
         self.processes.close()

@@ -65,6 +65,15 @@ class DecoysInCrops(unittest.TestCase):
                 self.assertGreater((labels[green_pixels] == static).mean(), 0.95)
         self.assertGreater(found, 5)
 
+    def test_pictures_in_which_something_may_move_give_none(self):
+        rooms = one_picture_set("rooms")
+        picture, labels = rooms[0]
+        rooms.pictures.append(picture)
+        rooms.labels.append(np.full_like(labels, label_set.set_number(label_set.STATIC)))
+        rooms.labels[0] = np.full_like(labels, label_set.set_number(label_set.NOT_PERSON))
+        self.assertEqual(len(mixture.static_pictures([rooms])), 1)
+        self.assertEqual(mixture.static_pictures([one_picture_set("camvid")]), [])
+
     def test_both_sources_are_drawn_from_and_none_needs_to_be_there(self):
         mask = np.full((20, 20), 255, np.uint8)
         thing = (np.zeros((20, 20, 3), np.uint8), mask)

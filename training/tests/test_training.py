@@ -12,9 +12,11 @@ import cv2
 import numpy as np
 import torch
 
-from training.segmentation import checkpoint, evaluation, export, figures, label_set, losses, mixture, networks, train
-from training.tests.test_data import NO_DECOYS, one_picture_set, red_person
+from training.segmentation import (ablation, checkpoint, evaluation, export, figures, label_set, losses, mixture,
+                                   networks, train)
+from training.tests.test_data import NO_DECOYS, SHARED, one_picture_set, red_person
 
+MODELS = Path(__file__).parents[2] / "models"
 PROGRAM = os.environ.get("ROSLAM_PROGRAM", "")
 
 
@@ -94,6 +96,15 @@ class Export(unittest.TestCase):
                 expected = network(picture).detach().numpy()
                 np.testing.assert_allclose(runner.forward(), expected, atol=1e-4 * np.abs(expected).max())
 
+    def test_a_network_that_gives_no_numbers_is_refused(self):
+        network = random_network("wide-stem")
+        with torch.no_grad():
+            network.classifier.bias.fill_(float("nan"))
+        with tempfile.TemporaryDirectory() as folder:
+            with self.assertRaisesRegex(RuntimeError, "differ"):
+                export.export(network, Path(folder) / "net.onnx")
+            self.assertFalse((Path(folder) / "net.onnx").exists())
+
     def test_weights_alone_are_a_checkpoint_of_half_the_size(self):
         network = random_network()
         with tempfile.TemporaryDirectory() as folder:
@@ -135,6 +146,12 @@ class Schedule(unittest.TestCase):
         self.assertAlmostEqual(train.rate_at(500, options), 0.01)
         self.assertAlmostEqual(train.rate_at(900, options), 0.005)
         self.assertLess(train.rate_at(999, options), 1e-4)
+
+
+class Ablation(unittest.TestCase):
+    def test_unknown_experiments_are_named(self):
+        with self.assertRaisesRegex(ValueError, "resnet: no such experiment"):
+            ablation.run("", "", train.TrainingOptions(), ["table2", "resnet"])
 
 
 class Figures(unittest.TestCase):
@@ -186,6 +203,24 @@ class Training(unittest.TestCase):
             for name in a:
                 torch.testing.assert_close(a[name], b[name], rtol=1e-4, atol=1e-5)
 
+    def test_a_request_to_stop_during_validation_waits_for_the_next_step(self):
+        with tempfile.TemporaryDirectory() as folder:
+            trainer = self.trainer(folder, 8)
+            trainer.options = dataclasses.replace(trainer.options, validate_every=4)
+            trainer.validate = lambda: setattr(trainer, "stopped", True)
+            trainer.run()
+            self.assertEqual(trainer.step, 5)
+            self.assertEqual(checkpoint.load(Path(folder) / "last.pt")["step"], 5)
+
+    def test_a_loss_that_is_no_number_ends_the_run_before_it_is_saved(self):
+        with tempfile.TemporaryDirectory() as folder:
+            trainer = self.trainer(folder, 8)
+            with torch.no_grad():
+                trainer.network.classifier.bias.fill_(float("nan"))
+            with self.assertRaisesRegex(ArithmeticError, "loss of step 0 is nan"):
+                trainer.run()
+            self.assertFalse((Path(folder) / "last.pt").exists())
+
     def test_damaged_checkpoints_are_named(self):
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "last.pt"
@@ -233,6 +268,23 @@ class Program(unittest.TestCase):
             equal += (labels == expected).sum()
             total += labels.size
         self.assertGreaterEqual(equal / total, 0.995)
+
+    def test_the_shipped_file_has_the_shipped_weights(self):
+        network = checkpoint.load_network(MODELS / "roslam-pspnet.pt")
+        data = SHARED / "segmentation/camvid/val/images"
+        files = sorted(data.glob("*"))[::2] if data.exists() else []
+        pictures = {f.stem: cv2.imread(str(f)) for f in files} or dict(self.pictures())
+        (self.root / "in").mkdir()
+        for name, picture in pictures.items():
+            cv2.imwrite(str(self.root / "in" / f"{name}.png"), picture)
+        self.run_program("segment", self.root / "in", "--out", self.root / "out", "--quiet")
+        equal, total, seen = 0, 0, set()
+        for name, picture in pictures.items():
+            expected = evaluation.predict(network, picture[..., ::-1].copy())
+            labels = cv2.imread(str(self.root / "out" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
+            equal, total, seen = equal + (labels == expected).sum(), total + labels.size, seen | set(np.unique(labels))
+        self.assertGreaterEqual(equal / total, 0.995)
+        self.assertGreater(len(seen), 2)
 
     def test_scores_are_those_of_this_code(self):
         rng = np.random.default_rng(4)
