@@ -249,42 +249,38 @@ class Program(unittest.TestCase):
             coarse = rng.integers(0, 256, (size[0] // 30 + 2, size[1] // 30 + 2, 3), np.uint8)
             yield f"{i}", cv2.resize(coarse, size[::-1], interpolation=cv2.INTER_CUBIC)
 
+    def assert_same_labels(self, network, pictures, *arguments):
+        """Demands that `roslam segment` labels pictures as PyTorch does; returns the labels of PyTorch."""
+        (self.root / "in").mkdir()
+        for name, picture in pictures.items():
+            cv2.imwrite(str(self.root / "in" / f"{name}.png"), picture)
+        self.run_program("segment", self.root / "in", "--out", self.root / "out", "--quiet", *arguments)
+        expected = {name: evaluation.predict(network, picture[..., ::-1].copy()) for name, picture in pictures.items()}
+        equal, total = 0, 0
+        for name in pictures:
+            labels = cv2.imread(str(self.root / "out" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
+            equal += (labels == expected[name]).sum()
+            total += labels.size
+        self.assertGreaterEqual(equal / total, 0.995)
+        return list(expected.values())
+
     def test_labels_are_those_of_pytorch(self):
         network = random_network()
         with torch.no_grad():  # the classes made alike on average, or one would win nearly everywhere
             mean = network(evaluation.network_input(next(self.pictures())[1])).mean((0, 2, 3))
             network.classifier.bias -= mean
         export.export(network, self.root / "net.onnx")
-        (self.root / "in").mkdir()
         pictures = dict(self.pictures())
-        for name, picture in pictures.items():
-            cv2.imwrite(str(self.root / "in" / f"{name}.png"), picture)
-        self.run_program("segment", self.root / "in", "--out", self.root / "out", "--model", self.root / "net.onnx")
-        equal, total = 0, 0
-        for name, picture in pictures.items():
-            expected = evaluation.predict(network, picture[..., ::-1].copy())
-            labels = cv2.imread(str(self.root / "out" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
+        for expected in self.assert_same_labels(network, pictures, "--model", self.root / "net.onnx"):
             self.assertGreater(len(np.unique(expected)), 2)  # or the comparison would say nothing
-            equal += (labels == expected).sum()
-            total += labels.size
-        self.assertGreaterEqual(equal / total, 0.995)
 
     def test_the_shipped_file_has_the_shipped_weights(self):
         network = checkpoint.load_network(MODELS / "roslam-pspnet.pt")
         data = SHARED / "segmentation/camvid/val/images"
         files = sorted(data.glob("*"))[::2] if data.exists() else []
         pictures = {f.stem: cv2.imread(str(f)) for f in files} or dict(self.pictures())
-        (self.root / "in").mkdir()
-        for name, picture in pictures.items():
-            cv2.imwrite(str(self.root / "in" / f"{name}.png"), picture)
-        self.run_program("segment", self.root / "in", "--out", self.root / "out", "--quiet")
-        equal, total, seen = 0, 0, set()
-        for name, picture in pictures.items():
-            expected = evaluation.predict(network, picture[..., ::-1].copy())
-            labels = cv2.imread(str(self.root / "out" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
-            equal, total, seen = equal + (labels == expected).sum(), total + labels.size, seen | set(np.unique(labels))
-        self.assertGreaterEqual(equal / total, 0.995)
-        self.assertGreater(len(seen), 2)
+        expected = self.assert_same_labels(network, pictures)
+        self.assertGreater(len(set().union(*map(np.unique, expected))), 2)
 
     def test_scores_are_those_of_this_code(self):
         rng = np.random.default_rng(4)
