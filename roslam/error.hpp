@@ -36,6 +36,12 @@ class ModelError : public Error {
   using Error::Error;
 };
 
+/// Less memory left than something needs.
+class MemoryError : public Error {
+ public:
+  using Error::Error;
+};
+
 /// A result that could not be written: folder not writable, disk full.
 class OutputError : public Error {
  public:

@@ -136,6 +136,12 @@ TEST_F(SegmentCommand, TellsWhatIsWrongInOneLine) {
   fails("no.mp4 --out out", "no.mp4: is no video");
   fails("in no.mp4 --out out", "no.mp4: a video must be given alone");
   fails("in --out in", "in: holds the pictures");
+  put("out/overlay/a.png", picture(kRed, kGreen));
+  fails("out/overlay --out out --overlay", "overlay: holds the pictures");
+  put("tum/colour/a.png", picture(kRed, kGreen));
+  std::ofstream(folder_ / "tum/rgb.txt") << "1.0 colour/a.png\n";
+  std::ofstream(folder_ / "tum/depth.txt") << "";
+  fails("tum --out tum/colour", "colour: holds the pictures");
   fails("in --out file", "file: cannot create the output folder");
   EXPECT_EQ(segment("in --out out --classes coco").code, 2);
   EXPECT_EQ(segment("in --out out --working-side 5").code, 2);
@@ -155,6 +161,18 @@ TEST_F(SegmentCommand, TellsOfABadModelInOneLine) {
   fails("empty.onnx", "empty.onnx: is empty");
   fails("in/a.png", "in/a.png: is damaged");
   fails(ROSLAM_TEST_FILES "/eleven.onnx", "11 classes");
+}
+
+TEST_F(SegmentCommand, TellsOfAPictureTooLargeForTheMemory) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers reserve more address space than the limit of this test";
+#endif
+  cv::imwrite((folder_ / "large.png").string(), cv::Mat(14000, 14000, CV_8UC1, cv::Scalar(0)));
+  const Outcome outcome =
+      shell_in(folder_, "export OPENBLAS_NUM_THREADS=1; ulimit -v 1000000; " ROSLAM_PROGRAM
+                        " segment large.png --out out --model " ROSLAM_TEST_FILES "/colours.onnx");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_NE(outcome.error.find("large.png: needs more memory"), std::string::npos) << outcome.error;
 }
 
 }  // namespace

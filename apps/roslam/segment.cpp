@@ -6,7 +6,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <opencv2/core/utility.hpp>
+#include <set>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -36,7 +36,6 @@ struct SegmentArguments {
   fs::path model;
   InferenceBackend backend = InferenceBackend::kAutomatic;
   SegmenterOptions options;
-  int threads = 1;
   bool quiet = false;
   bool json = false;
 };
@@ -68,15 +67,26 @@ struct Findings {
   double confidence(std::size_t c) const { return areas[c] > 0.0 ? confidences[c] / areas[c] : 0.0; }
 };
 
-// Labels are named as the pictures: in their folder they would replace them.
-void protect_inputs(const SegmentArguments& arguments) {
-  for (const auto& input : arguments.inputs) {
+std::set<fs::path> folders_of_pictures(const std::vector<std::string>& inputs) {
+  std::set<fs::path> folders;
+  for (const fs::path path : inputs) {
     std::error_code error;
-    const fs::path path(input);
-    const fs::path folder = fs::is_directory(path, error) ? path : fs::absolute(path).parent_path();
-    for (const auto& place : {folder, folder / "images", folder / "rgb"}) {
-      if (fs::equivalent(place, arguments.out, error)) {
-        throw OutputError(arguments.out.string() +
+    if (fs::is_directory(path, error)) {
+      for (const auto& file : pictures_in(path)) folders.insert(file.parent_path());
+    } else {
+      folders.insert(fs::absolute(path).parent_path());
+    }
+  }
+  return folders;
+}
+
+// Labels and overlays are named as the pictures: in their folder they would replace them.
+void protect_inputs(const SegmentArguments& arguments) {
+  for (const auto& folder : folders_of_pictures(arguments.inputs)) {
+    for (const auto& written : {arguments.out, arguments.out / "overlay"}) {
+      std::error_code error;
+      if ((written == arguments.out || arguments.overlay) && fs::equivalent(folder, written, error)) {
+        throw OutputError(written.string() +
                           ": holds the pictures, which labels could replace; choose another --out");
       }
     }
@@ -140,7 +150,6 @@ Findings label_all(const SegmentArguments& arguments, const LabelSet& set, Pictu
 }
 
 void segment(const SegmentArguments& arguments) {
-  cv::setNumThreads(arguments.threads);
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // FFmpeg's own lines say less than ours
   const InterruptWatcher interrupt;
   const LabelSet set = *label_set_from(arguments.classes);
@@ -206,9 +215,6 @@ void add_segment_command(CLI::App& program) {
                    "What runs the network; auto is ONNX Runtime where built with it")
       ->transform(CLI::CheckedTransformer(backends).description(""))
       ->type_name("auto|opencv|onnxruntime");
-  command->add_option("--threads", arguments->threads, "Processor cores the network may use")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
   command->add_flag("--quiet", arguments->quiet, "No progress");
   command->add_flag("--json", arguments->json, "Print the summary as one JSON object");
   command->callback([arguments] { segment(*arguments); });

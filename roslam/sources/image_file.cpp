@@ -22,6 +22,12 @@ bool is_complete(const std::vector<char>& bytes) {
   return true;
 }
 
+// Else a picture too large for this machine would be counted as damaged.
+void throw_if_out_of_memory(const cv::Exception& error, const std::filesystem::path& file) {
+  if (error.code != cv::Error::StsNoMem) return;
+  throw MemoryError(file.string() + ": needs more memory than is left; close other programs or shrink it");
+}
+
 ImageFile read_image(const std::filesystem::path& file, int flags) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) return {{}, "is missing"};
@@ -37,7 +43,8 @@ ImageFile read_image(const std::filesystem::path& file, int flags) {
   cv::Mat image;
   try {
     image = cv::imdecode(bytes, flags);
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& error) {
+    throw_if_out_of_memory(error, file);
     image.release();
   }
   if (image.empty()) return {{}, "cannot be decoded"};
@@ -72,7 +79,8 @@ void write_image(const std::filesystem::path& file, const cv::Mat& image,
   bool encoded = false;
   try {
     encoded = cv::imencode(file.extension().string(), image, bytes, parameters);
-  } catch (const cv::Exception&) {  // the same as false, with a message for programmers
+  } catch (const cv::Exception& error) {  // the same as false, with a message for programmers
+    throw_if_out_of_memory(error, file);
   }
   if (!encoded) {
     throw OutputError(file.string() +

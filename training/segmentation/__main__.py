@@ -5,6 +5,7 @@ import dataclasses
 import os
 import sys
 
+import cv2
 import torch
 
 from training.segmentation import (ablation, checkpoint, cost, evaluation, export, figures, label_set,
@@ -48,7 +49,7 @@ def run_train(arguments):
 
 def run_evaluate(arguments):
     network = checkpoint.load_network(arguments.checkpoint)
-    sets = mixture.validation_sets(arguments.data)
+    sets = mixture.validation_sets(arguments.data, arguments.cityscapes)
     sets.append((sets[0][0], label_set.CITYSCAPES19))
     for data, groups in sets:
         scored = evaluation.score(network, data, groups, arguments.side)
@@ -58,7 +59,7 @@ def run_evaluate(arguments):
 
 
 def run_export(arguments):
-    network = checkpoint.load_network(arguments.checkpoint)
+    network = checkpoint.averaged(arguments.checkpoint)
     export.export(network, arguments.out)
     if arguments.weights:
         checkpoint.save_weights(arguments.weights, network)
@@ -109,10 +110,11 @@ def main():
 
     added = command("evaluate", run_evaluate, "score a checkpoint on the validation sets", data=True)
     added.add_argument("--checkpoint", required=True)
+    added.add_argument("--cityscapes", help="Cityscapes in its official layout, in place of the 256x256 copy")
     added.add_argument("--side", type=int, default=evaluation.WORKING_SIDE, help="longer side the network sees, pixels")
 
     added = command("export", run_export, "write a checkpoint as an ONNX file and check it with OpenCV")
-    added.add_argument("--checkpoint", required=True)
+    added.add_argument("--checkpoint", required=True, nargs="+", help="of several of one variant the mean is written")
     added.add_argument("--out", required=True, help="the ONNX file")
     added.add_argument("--weights", help="also write the weights alone, in half precision, to start other runs from")
 
@@ -132,6 +134,7 @@ def main():
     added.add_argument("--pictures", nargs="*", default=())
 
     arguments = parser.parse_args()
+    cv2.setNumThreads(1)  # a pool of threads does not survive the fork that makes the workers of a loader
     try:
         return arguments.run(arguments) or 0
     except (DataError, ValueError, ArithmeticError) as error:

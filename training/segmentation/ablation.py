@@ -60,8 +60,19 @@ def trained_and_scored(source, folder, options):
         if trainer.stopped:
             return None
         scores = evaluation.score_all(checkpoint.load_network(folder / "last.pt"), source.validation)
-        file.write_text(json.dumps({"steps": options.steps, **scores}))
+        file.write_text(json.dumps(scores))
+    demand_same_recipe(folder, options)
     return json.loads(file.read_text())
+
+
+def demand_same_recipe(folder, options):
+    """Scores of another recipe would be compared with those of this one."""
+    trained = checkpoint.load(folder / "last.pt")["training_options"]
+    asked = dataclasses.asdict(options)
+    changed = [name for name in asked if trained.get(name) != asked[name]
+               and name not in ("workers", "save_every", "validate_every")]
+    if changed:
+        raise checkpoint.DataError(f"{folder}: was trained with another {', '.join(changed)}; give another --out")
 
 
 def markdown(rows):

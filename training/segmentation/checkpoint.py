@@ -32,9 +32,27 @@ def load(file):
 def load_network(file):
     """The averaged network of a checkpoint, in evaluation mode."""
     content = load(file)
-    network = networks.PSPNet(networks.NetworkOptions(**content["network_options"]))
-    network.load_state_dict(content["average"])
+    try:
+        network = networks.PSPNet(networks.NetworkOptions(**content["network_options"]))
+        network.load_state_dict(content["average"])
+    except (KeyError, TypeError, RuntimeError) as error:
+        raise DataError(f"{file}: holds no network of this version ({type(error).__name__})") from error
     return network.eval()
+
+
+def averaged(files):
+    """The mean of the averaged networks of several checkpoints of one variant, in evaluation mode. Where they are runs
+    of one origin, their mean holds what each learned and errs less on what none has seen (M. Wortsman et al., "Model
+    soups", 2022). A file named several times counts several times."""
+    networks_of_files = [load_network(file) for file in files]
+    result = networks_of_files[0]
+    for file, network in zip(files, networks_of_files):
+        if network.options != result.options:
+            raise DataError(f"{file}: is of another variant than {files[0]}")
+    states = [network.state_dict() for network in networks_of_files]
+    result.load_state_dict({name: torch.stack([s[name] for s in states]).mean(0) if w.is_floating_point() else w
+                            for name, w in states[0].items()})
+    return result
 
 
 def save_weights(file, network):

@@ -17,9 +17,6 @@ MOVABLE = tuple(range(11, 19))
 STATIC = tuple(range(11))
 NOT_PERSON = tuple(c for c in range(19) if c not in PERSON)
 
-# The movable classes of the paper's auxiliary descriptor (eq. 12); what moves without a label is "unknown" there.
-MOVABLE_GROUPS = {"person": (11, 12), "car": (13, 14, 15, 16, 17), "bicycle": (18,)}
-
 CITYSCAPES19 = {name: (c,) for c, name in enumerate(CLASSES)}
 
 GROUPS8 = {"flat": (0, 1), "building": (2, 3, 4), "pole": (5, 6, 7), "nature": (8, 9), "sky": (10,), "person": (11, 12),

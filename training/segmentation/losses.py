@@ -36,6 +36,8 @@ class LossOptions:
             raise ValueError("form must be cross-entropy or squared-hinge")
         if min(self.auxiliary, self.floor, self.head_decay, self.jaccard) < 0:
             raise ValueError("auxiliary, floor, head_decay and jaccard must not be negative")
+        if self.balance != 0 and self.balance <= 1:
+            raise ValueError("balance must be 0 or more than 1")
 
 
 def labels_at(labels, size):
@@ -148,8 +150,7 @@ class DeepSupervision(torch.nn.Module):
         self.register_buffer("weights", torch.cat([class_weights(shares, options.balance), extra]), persistent=False)
 
     def main(self, scores, labels):
-        """Mean over the known pixels, weighted by class (L_p)."""
-        labels = labels_at(labels, scores.shape[2:])
+        """Mean over the known pixels, weighted by class (L_p). labels: of the size of the scores."""
         weights = self.weights[labels.long()]
         return (self.pixel_loss(scores, labels) * weights).sum() / weights.sum().clamp(min=1e-6)
 
@@ -170,11 +171,12 @@ class DeepSupervision(torch.nn.Module):
         """outputs: (scores, auxiliary scores ...) as the network gives them in training. heads: the weights that
         head_decay holds small."""
         main, *hidden = (o.float() for o in outputs)
-        loss = self.main(main, labels)
+        labels_of_main = labels_at(labels, main.shape[2:])
+        loss = self.main(main, labels_of_main)
         # Also with a weight of 0: processes that train together need a gradient for every weight.
         loss = loss + self.options.auxiliary * sum(self.hidden(h, labels) for h in hidden)
         if self.options.jaccard:
-            loss = loss + self.options.jaccard * self.jaccard(main, labels_at(labels, main.shape[2:]))
+            loss = loss + self.options.jaccard * self.jaccard(main, labels_of_main)
         if self.options.head_decay:
             loss = loss + self.options.head_decay * sum((w ** 2).sum() for w in heads)
         return loss

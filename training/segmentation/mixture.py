@@ -44,6 +44,8 @@ class TrainingData:
 
 def training_data(folder, official_cityscapes=None, only=()):
     """Reads it. only: names of datasets to train on; empty = all."""
+    if unknown := set(only) - set(SHARES):
+        raise ValueError(f"{', '.join(sorted(unknown))}: no such dataset; there are {', '.join(SHARES)}")
     readers = {name: lambda name=name: getattr(datasets, name)(folder, "train")
                for name in ("cityscapes256", "camvid", "people", "drone_people")}
     readers["coco128"] = lambda: datasets.coco128(folder)
@@ -54,7 +56,7 @@ def training_data(folder, official_cityscapes=None, only=()):
         readers["cityscapes"] = lambda: datasets.cityscapes(official_cityscapes, "train")
     sets = [read() for name, read in readers.items() if not only or name in only]
     decoys = augmentation.Decoys(static_pictures(sets), datasets.static_things(folder))
-    return TrainingData(sets, datasets.cutouts(folder, "train"), decoys, validation_sets(folder))
+    return TrainingData(sets, datasets.cutouts(folder, "train"), decoys, validation_sets(folder, official_cityscapes))
 
 
 class Mixture(data.Dataset):
@@ -95,9 +97,11 @@ def static_pictures(sets):
             if (labels == static).all()]
 
 
-def validation_sets(folder):
+def validation_sets(folder, official_cityscapes=None):
     """Pairs of a dataset and the grouping it is scored in."""
-    return [(datasets.cityscapes256(folder, "val"), label_set.GROUPS8),
+    streets = (datasets.cityscapes(official_cityscapes, "val") if official_cityscapes
+               else datasets.cityscapes256(folder, "val"))
+    return [(streets, label_set.GROUPS8),
             (datasets.camvid(folder, "val"), label_set.CAMVID11),
             (datasets.people(folder, "val"), label_set.PERSON1),
             (datasets.drone_people(folder, "val"), label_set.PERSON1)]

@@ -44,8 +44,15 @@ class TrainingOptions:
             raise ValueError(f"variant {self.variant}: one of {', '.join(networks.variants())}")
         if self.optimiser not in ("orthogonal", "adam"):
             raise ValueError("optimiser must be orthogonal or adam")
-        if min(self.steps, self.batch, self.crop) < 1 or not 0 < self.learning_rate < 1:
-            raise ValueError("steps, batch and crop must be positive, learning_rate between 0 and 1")
+        if min(self.steps, self.batch, self.crop, self.warm_up, self.save_every, self.validate_every) < 1:
+            raise ValueError("steps, batch, crop, warm_up, save_every and validate_every must be positive")
+        if not 0 < self.learning_rate < 1 or not 0 <= self.average < 1 or not 0 <= self.decay_share <= 1:
+            raise ValueError("learning_rate, average and decay_share must be between 0 and 1")
+        if self.weight_decay < 0 or self.workers < 0:
+            raise ValueError("weight_decay and workers must not be negative")
+        if self.precision not in ("auto", "float", "half"):
+            raise ValueError("precision must be auto, float or half")
+        self.loss.validate()
         if self.crop % networks.SIZE_MULTIPLE:
             raise ValueError(f"crop must be a multiple of {networks.SIZE_MULTIPLE} pixels")
 
@@ -134,7 +141,8 @@ def _single_threaded(_):
 
     cv2.setNumThreads(1)
     torch.set_num_threads(1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the main process decides when to stop
+    for number in (signal.SIGINT, signal.SIGTERM):  # the main process decides when to stop
+        signal.signal(number, signal.SIG_IGN)
 
 
 class Log:
@@ -157,6 +165,8 @@ class Trainer:
         options.validate()
         self.options, self.out = options, Path(out)
         self.processes = Processes()
+        if options.batch % self.processes.count:
+            raise ValueError(f"batch must be a multiple of the {self.processes.count} processes")
         self.out.mkdir(parents=True, exist_ok=True)
         self.log = Log(self.out / "log.jsonl", self.processes.rank == 0)
         crops = dataclasses.replace(mixture.augmentation.AugmentationOptions(), crop=options.crop)
@@ -178,10 +188,15 @@ class Trainer:
             self.restore(checkpoint.load(self.out / "last.pt"))
         elif start_from:
             missing = networks.load_matching(self.network, checkpoint.load(start_from)["average"])
+            if missing == len(self.network.state_dict()):
+                raise checkpoint.DataError(f"{start_from}: no weight of it has a place in {options.variant}")
             self.log.write(event="weights taken over", of=str(start_from), new=missing)
             self.average = checkpoint.Average(self.network, options.average)
 
     def restore(self, content):
+        if content.get("network_options") != dataclasses.asdict(self.network.options):
+            raise checkpoint.DataError(f"{self.out / 'last.pt'}: is of another variant than {self.options.variant}; give "
+                                       "another --out")
         self.network.load_state_dict(content["network"])
         self.average.network.load_state_dict(content["average"])
         # Another optimiser cannot use what the one before it remembered, and starts afresh.
@@ -235,8 +250,15 @@ class Trainer:
 
     def run(self):
         """Trains to the last step. Ctrl-C or a termination request saves and stops; the same call goes on."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: setattr(self, "stopped", True))
+        before = {number: signal.signal(number, lambda *_: setattr(self, "stopped", True))
+                  for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            self.run_to_the_end()
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def run_to_the_end(self):
         self.log.write(event="start", step=self.step, variant=self.options.variant, device=str(self.processes.device),
                        processes=self.processes.count, host=platform.machine(), torch=torch.__version__)
         network = self.processes.wrap(self.network).train()

@@ -28,10 +28,6 @@ class LabelSets(unittest.TestCase):
         self.assertEqual(label_set.FROM_CITYSCAPES_IDS[24], 11)
         self.assertEqual(label_set.FROM_CITYSCAPES_IDS[0], label_set.VOID)
 
-    def test_movable_groups_are_the_movable_classes(self):
-        members = sorted(c for classes in label_set.MOVABLE_GROUPS.values() for c in classes)
-        self.assertEqual(tuple(members), label_set.MOVABLE)
-
 
 def one_picture_set(name="rooms"):
     rng = np.random.default_rng(1)

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import dataclasses
 import json
+import multiprocessing
 import os
 import re
+import signal
 import subprocess
 import tempfile
 import unittest
 from pathlib import Path
+
+os.environ["CUDA_VISIBLE_DEVICES"] = ""  # a GPU adds in any order, and no two runs are alike
 
 import cv2
 import numpy as np
@@ -82,6 +86,14 @@ class Networks(unittest.TestCase):
             networks.PSPNet(networks.NetworkOptions(block5_stride=4))
         with self.assertRaisesRegex(ValueError, "variant"):
             train.TrainingOptions(variant="resnet").validate()
+        for wrong in ({"warm_up": 0}, {"save_every": 0}, {"precision": "single"}, {"average": 1.0}, {"workers": -1},
+                      {"decay_share": 2.0}):
+            with self.assertRaisesRegex(ValueError, next(iter(wrong))):
+                train.TrainingOptions(**wrong).validate()
+        with self.assertRaisesRegex(ValueError, "balance"):
+            train.TrainingOptions(loss=losses.LossOptions(balance=0.5)).validate()
+        with self.assertRaisesRegex(ValueError, "kitti: no such dataset"):
+            mixture.training_data("", only=("kitti",))
 
 
 class Export(unittest.TestCase):
@@ -114,6 +126,21 @@ class Export(unittest.TestCase):
             picture = torch.rand(1, 3, 64, 64)
             torch.testing.assert_close(again(picture), network(picture), rtol=0.05, atol=0.05)
             self.assertLess(file.stat().st_size, 3 * sum(p.numel() for p in network.parameters()))
+
+    def test_the_mean_of_checkpoints(self):
+        with tempfile.TemporaryDirectory() as folder:
+            files = [Path(folder) / "a.pt", Path(folder) / "b.pt", Path(folder) / "other.pt"]
+            first, second = random_network(), random_network()
+            with torch.no_grad():
+                second.classifier.bias += 3
+            for file, network in zip(files, (first, second, random_network("wide-stem"))):
+                checkpoint.save(file, {"average": network.state_dict(),
+                                       "network_options": dataclasses.asdict(network.options)})
+            mean = checkpoint.averaged([files[0], files[1], files[1]])
+            torch.testing.assert_close(mean.classifier.bias, first.classifier.bias + 2)
+            torch.testing.assert_close(mean.block1[0].weight, first.block1[0].weight)
+            with self.assertRaisesRegex(checkpoint.DataError, "other.pt: is of another variant"):
+                checkpoint.averaged(files)
 
     def test_a_pyramid_of_bins_exports_for_one_size(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -152,6 +179,16 @@ class Ablation(unittest.TestCase):
     def test_unknown_experiments_are_named(self):
         with self.assertRaisesRegex(ValueError, "resnet: no such experiment"):
             ablation.run("", "", train.TrainingOptions(), ["table2", "resnet"])
+
+    def test_scores_of_another_recipe_are_not_taken(self):
+        with tempfile.TemporaryDirectory() as folder:
+            recipe = train.TrainingOptions(steps=3)
+            (Path(folder) / "scores.json").write_text('{"people": 0.5}')
+            checkpoint.save(Path(folder) / "last.pt", {"training_options": dataclasses.asdict(recipe)})
+            same = dataclasses.replace(recipe, save_every=7)
+            self.assertEqual(ablation.trained_and_scored(None, Path(folder), same), {"people": 0.5})
+            with self.assertRaisesRegex(checkpoint.DataError, "another learning_rate"):
+                ablation.trained_and_scored(None, Path(folder), dataclasses.replace(recipe, learning_rate=0.01))
 
 
 class Figures(unittest.TestCase):
@@ -211,6 +248,36 @@ class Training(unittest.TestCase):
             trainer.run()
             self.assertEqual(trainer.step, 5)
             self.assertEqual(checkpoint.load(Path(folder) / "last.pt")["step"], 5)
+
+    def test_what_signals_did_before_they_do_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            before = [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)]
+            self.trainer(folder, 1).run()
+            self.assertEqual([signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)], before)
+
+    def test_a_request_to_stop_leaves_the_workers_alone(self):
+        with tempfile.TemporaryDirectory() as folder:
+            trainer = self.trainer(folder, 8)
+            trainer.options = dataclasses.replace(trainer.options, workers=1)
+            step = trainer.train_step
+
+            def stop_all(*batch):
+                if trainer.step == 4:  # what a terminal or `timeout` does: every process of the group is asked
+                    for child in multiprocessing.active_children():
+                        os.kill(child.pid, signal.SIGTERM)
+                    os.kill(os.getpid(), signal.SIGTERM)
+                return step(*batch)
+
+            trainer.train_step = stop_all
+            trainer.run()
+            self.assertEqual(checkpoint.load(Path(folder) / "last.pt")["step"], 5)
+
+    def test_checkpoints_of_another_variant_are_refused(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.trainer(folder, 1).run()
+            source = mixture.TrainingData([one_picture_set("camvid")], [], NO_DECOYS)
+            with self.assertRaisesRegex(checkpoint.DataError, "another variant than decoder"):
+                train.Trainer(source, folder, train.TrainingOptions(variant="decoder", crop=64))
 
     def test_a_loss_that_is_no_number_ends_the_run_before_it_is_saved(self):
         with tempfile.TemporaryDirectory() as folder:
