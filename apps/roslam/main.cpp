@@ -3,6 +3,7 @@
 #include <exception>
 #include <iostream>
 #include <new>
+#include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
 #include <string>
 
@@ -12,6 +13,7 @@
 namespace {
 constexpr int kInputError = 1;
 constexpr int kUsageError = 2;
+constexpr const char* kOutOfMemory = "error: out of memory; close other programs or use smaller images\n";
 
 // Scripts read one line; messages of other libraries may hold several.
 std::string one_line(std::string text) {
@@ -39,7 +41,14 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? 0 : kUsageError;
   } catch (const std::bad_alloc&) {
-    std::cerr << "error: out of memory; close other programs or use smaller images\n";
+    std::cerr << kOutOfMemory;
+    return kInputError;
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) {
+      std::cerr << kOutOfMemory;
+    } else {
+      std::cerr << "error: " << one_line(error.what()) << "\n";
+    }
     return kInputError;
   } catch (const std::exception& error) {
     std::cerr << "error: " << one_line(error.what()) << "\n";
