@@ -84,6 +84,6 @@ def score_all(network, validation):
     for data_set, groups in validation:
         scored = score(network, data_set, groups)
         result[data_set.name] = scored["classes"]["person"] if groups is label_set.PERSON1 else scored["mean"]
-        if "car" in groups and groups is label_set.GROUPS8:
+        if groups is label_set.GROUPS8:
             result["car"] = scored["classes"]["car"]
     return result
