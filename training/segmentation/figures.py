@@ -13,8 +13,9 @@ import numpy as np
 from training.segmentation import datasets, evaluation, label_set
 from training.segmentation.datasets import DataError
 
-NAMES = {"cityscapes256": "Cityscapes at 256x256, mean of 8 groups", "cityscapes": "Cityscapes, mean of 8 groups", "camvid": "CamVid, mean of 11 classes",
-         "people": "people", "drone_people": "people from a drone", "car": "car (Cityscapes)"}
+NAMES = {"cityscapes256": "Cityscapes at 256x256, mean of 8 groups", "cityscapes": "Cityscapes, mean of 8 groups",
+         "camvid": "CamVid, mean of 11 classes", "people": "people", "drone_people": "people from a drone",
+         "car": "car (Cityscapes)"}
 
 
 def read_log(file):
