@@ -2,18 +2,15 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
-#include <new>
-#include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
 #include <string>
 
 #include "apps/roslam/commands.hpp"
-#include "roslam/error.hpp"
+#include "roslam/out_of_memory.hpp"
 
 namespace {
 constexpr int kInputError = 1;
 constexpr int kUsageError = 2;
-constexpr const char* kOutOfMemory = "error: out of memory; close other programs or use smaller images\n";
 
 // Scripts read one line; messages of other libraries may hold several.
 std::string one_line(std::string text) {
@@ -40,18 +37,12 @@ int main(int argc, char** argv) {
     return 0;
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? 0 : kUsageError;
-  } catch (const std::bad_alloc&) {
-    std::cerr << kOutOfMemory;
-    return kInputError;
-  } catch (const cv::Exception& error) {
-    if (error.code == cv::Error::StsNoMem) {
-      std::cerr << kOutOfMemory;
-    } else {
-      std::cerr << "error: " << one_line(error.what()) << "\n";
-    }
-    return kInputError;
   } catch (const std::exception& error) {
-    std::cerr << "error: " << one_line(error.what()) << "\n";
+    const bool is_memory = roslam::is_out_of_memory(error);
+    std::cerr << "error: "
+              << (is_memory ? "out of memory; close other programs or use smaller images"
+                            : one_line(error.what()))
+              << "\n";
     return kInputError;
   }
 }

@@ -9,21 +9,15 @@
 #include <system_error>
 
 #include "roslam/error.hpp"
+#include "roslam/out_of_memory.hpp"
 
 namespace roslam {
 
 namespace {
-constexpr std::uintmax_t kLargestModel = 256U << 20U;  // bytes; ours has a few MB
+constexpr std::uintmax_t kLargestModel = 256U << 20U;             // bytes; ours has a few MB
+constexpr const char* kRemedy = "choose a smaller working side";  // where memory is short
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
-
-// Else a sound model would be called damaged.
-void throw_if_out_of_memory(const cv::Exception& error, const std::filesystem::path& model) {
-  if (error.code != cv::Error::StsNoMem) return;
-  throw MemoryError(
-      model.string() +
-      ": needs more memory than is left; close other programs or choose a smaller working side");
-}
 
 // OpenCV prints what it then throws; callers report it themselves, once.
 class QuietOpenCv {
@@ -51,7 +45,7 @@ class OpenCvInference : public Inference {
       net_.setInput(input);
       return net_.forward();
     } catch (const cv::Exception& error) {
-      throw_if_out_of_memory(error, model_);
+      throw_if_out_of_memory(error, model_, kRemedy);
       throw ModelError(model_.string() + ": the network cannot be run (" + first_line(error.err) +
                        "); install the model that belongs to this version");
     }
@@ -87,7 +81,7 @@ std::unique_ptr<Inference> load_opencv_inference(const std::string& bytes,
     if (net.empty()) throw ModelError(model.string() + ": holds no network; install the model again");
     return std::make_unique<OpenCvInference>(std::move(net), model);
   } catch (const cv::Exception& error) {
-    throw_if_out_of_memory(error, model);
+    throw_if_out_of_memory(error, model, kRemedy);
     throw ModelError(model.string() + ": is damaged or no ONNX network that OpenCV can run (" +
                      first_line(error.err) + "); install the model again");
   }

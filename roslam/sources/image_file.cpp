@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "roslam/error.hpp"
+#include "roslam/out_of_memory.hpp"
 #include "roslam/write_file.hpp"
 
 namespace roslam {
@@ -20,12 +21,6 @@ bool is_complete(const std::vector<char>& bytes) {
   if (view.starts_with("\x89PNG")) return tail.find("IEND") != std::string_view::npos;
   if (view.starts_with("\xff\xd8")) return tail.find("\xff\xd9") != std::string_view::npos;
   return true;
-}
-
-// Else a picture too large for this machine would be counted as damaged.
-void throw_if_out_of_memory(const cv::Exception& error, const std::filesystem::path& file) {
-  if (error.code != cv::Error::StsNoMem) return;
-  throw MemoryError(file.string() + ": needs more memory than is left; close other programs or shrink it");
 }
 
 ImageFile read_image(const std::filesystem::path& file, int flags) {
@@ -44,7 +39,7 @@ ImageFile read_image(const std::filesystem::path& file, int flags) {
   try {
     image = cv::imdecode(bytes, flags);
   } catch (const cv::Exception& error) {
-    throw_if_out_of_memory(error, file);
+    throw_if_out_of_memory(error, file, "shrink it");
     image.release();
   }
   if (image.empty()) return {{}, "cannot be decoded"};
@@ -80,7 +75,7 @@ void write_image(const std::filesystem::path& file, const cv::Mat& image,
   try {
     encoded = cv::imencode(file.extension().string(), image, bytes, parameters);
   } catch (const cv::Exception& error) {  // the same as false, with a message for programmers
-    throw_if_out_of_memory(error, file);
+    throw_if_out_of_memory(error, file, "shrink it");
   }
   if (!encoded) {
     throw OutputError(file.string() +

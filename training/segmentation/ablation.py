@@ -6,7 +6,7 @@ from pathlib import Path
 
 from training.segmentation import checkpoint, cost, evaluation, losses, mixture, networks, train
 
-SIZE = (320, 416)  # what the network sees of a 640x480 camera by default
+SIZE = evaluation.working_size(480, 640)  # what the network sees of a 640x480 camera by default
 
 
 def experiments():
