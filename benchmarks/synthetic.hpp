@@ -11,7 +11,7 @@
 #include "roslam/geometry/se3.hpp"
 #include "roslam/mapping/bundle_adjustment.hpp"
 #include "roslam/sources/frame_source.hpp"
-#include "roslam/tracking/pose_optimiser.hpp"
+#include "roslam/geometry/pose_optimiser.hpp"
 
 namespace roslam::benchmarks {
 

@@ -52,7 +52,9 @@ Options altered() {
   for_each_option(options, [&](const char*, const char*, auto& field) {
     using Field = std::decay_t<decltype(field)>;
     const Field before = field;
-    if constexpr (std::is_same_v<Field, int>) {
+    if constexpr (std::is_same_v<Field, bool>) {
+      field = !before;
+    } else if constexpr (std::is_same_v<Field, int>) {
       field = before + 1;
       if (!accepts(options)) field = before - 1;
     } else {

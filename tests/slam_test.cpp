@@ -115,7 +115,7 @@ TEST(Slam, StopsWhenAskedAndKeepsWhatThereIs) {
     source.rewind();
     Slam slam(source.camera(), {}, mode);
     std::stop_source stop;
-    const auto stop_after_ten = [&](const FrameResult& frame) {
+    const auto stop_after_ten = [&](const Frame&, const FrameResult& frame) {
       if (frame.index >= 9) stop.request_stop();
     };
     const RunSummary summary = run(source, slam, stop_after_ten, stop.get_token());

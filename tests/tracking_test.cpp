@@ -4,8 +4,8 @@
 #include <random>
 
 #include "roslam/error.hpp"
+#include "roslam/geometry/pose_optimiser.hpp"
 #include "roslam/geometry/reprojection.hpp"
-#include "roslam/tracking/pose_optimiser.hpp"
 #include "roslam/tracking/projection_matcher.hpp"
 
 namespace roslam {

@@ -26,8 +26,8 @@ struct RunArguments {
   std::string config;
   bool deterministic = false;
   bool real_time = false;
-  std::string model;  // weights in place of the shipped ones
-  std::string dynamic = "none";
+  std::string model;    // weights in place of the shipped ones
+  std::string dynamic;  // empty: as the options say
   bool print_config = false;
   bool quiet = false;
   bool json = false;
@@ -53,18 +53,20 @@ void require_poses(const Slam& slam, const RunSummary& summary, const FrameSourc
 
 // The network that finds what may move; null where nothing is to be removed. Without its weights a flight is
 // still worth tracking.
-std::unique_ptr<PspnetSegmenter> open_segmenter(const RunArguments& arguments, const Options& options,
-                                                std::string& model) {
-  if (arguments.dynamic != "labels") return nullptr;
+std::shared_ptr<Segmenter> open_segmenter(const RunArguments& arguments, Options& options,
+                                          std::string& model) {
+  if (!options.removal.labels) return nullptr;
   const std::filesystem::path file =
       arguments.model.empty() ? shipped_segmentation_model() : std::filesystem::path(arguments.model);
   if (file.empty()) {
+    options.removal.labels = false;
     std::cerr << "note: " << missing_segmentation_model().what()
-              << "; points on things that move are not removed\n";
+              << (options.removal.is_on() ? "; what moves is found by geometry alone\n"
+                                          : "; points on things that move are not removed\n");
     return nullptr;
   }
   model = file.string();
-  return std::make_unique<PspnetSegmenter>(file, options.segmenter);
+  return std::make_shared<PspnetSegmenter>(file, options.segmenter);
 }
 
 void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder& folder) {
@@ -74,10 +76,6 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
       "tracked %zu of %zu frames (%.1f %%), %zu dropped%s\n", tracked, slam.frames(),
       100.0 * static_cast<double>(tracked) / static_cast<double>(std::max<std::size_t>(slam.frames(), 1)),
       summary.dropped, summary.interrupted ? ", interrupted" : "");
-  if (summary.removed_share > 0.0) {
-    std::printf("removed: %.1f %% of the picture on average, labelled as movable\n",
-                100.0 * summary.removed_share);
-  }
   std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
               slam.map().landmark_count());
   if (const auto found = times.find("tracking"); found != times.end()) {
@@ -88,7 +86,8 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
 }
 
 void execute(const RunArguments& arguments, const std::string& version) {
-  const Options options = arguments.config.empty() ? Options{} : read_options(arguments.config);
+  Options options = arguments.config.empty() ? Options{} : read_options(arguments.config);
+  if (!arguments.dynamic.empty()) options.removal = *removal_from(arguments.dynamic, options.removal);
   if (arguments.print_config) {
     std::cout << options_to_yaml(options);
     require_written_output();
@@ -96,22 +95,23 @@ void execute(const RunArguments& arguments, const std::string& version) {
   }
   if (arguments.source.name.empty()) throw CLI::RequiredError("SOURCE");
   if (arguments.out.empty()) throw CLI::RequiredError("--out");
-  if (!arguments.model.empty() && arguments.dynamic != "labels") {
-    throw CLI::ValidationError("--model", "needs --dynamic labels");
+  if (!arguments.model.empty() && !options.removal.labels) {
+    throw CLI::ValidationError("--model", "needs --dynamic labels or both");
   }
   const InterruptWatcher interrupt;
   const auto source = open_source(arguments.source);
   const RunFolder folder(arguments.out);
   RunDescription description{arguments.source.name, arguments.source.camera, version, {}};
   const auto segmenter = open_segmenter(arguments, options, description.segmentation_model);
-  Slam slam(source->camera(), options, arguments.real_time ? Mode::kRealTime : Mode::kDeterministic);
+  Slam slam(source->camera(), options, arguments.real_time ? Mode::kRealTime : Mode::kDeterministic,
+            segmenter);
   RunSummary summary;
   {
     Progress progress(source->size(), arguments.quiet || arguments.json);
     summary = run(
         *source, slam,
-        [&](const FrameResult& frame) { progress.show(frame.index + 1, name_of(frame.state)); },
-        interrupt.token(), segmenter.get());
+        [&](const Frame&, const FrameResult& frame) { progress.show(frame.index + 1, name_of(frame.state)); },
+        interrupt.token());
   }
   folder.write(slam, summary, *source, description);
   if (summary.failure) std::rethrow_exception(summary.failure);
@@ -156,10 +156,9 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command
       ->add_option(
           "--dynamic", arguments->dynamic,
-          "How points on things that may move are removed: none, or labels (a network labels each frame "
-          "and the tracker waits for it)")
-      ->check(CLI::IsMember({"none", "labels"}))
-      ->capture_default_str();
+          "How what moves is found and removed: none, labels (a network's persons, cars, bicycles), geometry "
+          "(depth and optical flow) or both; default both, or as --config says")
+      ->check(CLI::IsMember({"none", "labels", "geometry", "both"}));
   command->add_option(
       "--model", arguments->model,
       "Weights of the network that labels (ONNX), in place of those that come with the program");

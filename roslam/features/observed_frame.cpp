@@ -12,8 +12,8 @@ namespace {
 bool is_known(float depth, const DepthOptions& options) {
   return std::isfinite(depth) && depth >= options.min_depth && depth <= options.max_depth;
 }
+}  // namespace
 
-// Depth at a pixel, or 0 where it is unknown or where foreground and background meet.
 float depth_at(const cv::Mat& depth, const cv::Point2f& pixel, const DepthOptions& options) {
   const int x = static_cast<int>(std::lround(pixel.x));
   const int y = static_cast<int>(std::lround(pixel.y));
@@ -29,7 +29,6 @@ float depth_at(const cv::Mat& depth, const cv::Point2f& pixel, const DepthOption
   }
   return centre;
 }
-}  // namespace
 
 void DepthOptions::validate() const {
   if (!(min_depth > 0.0)) throw OptionsError("depth.min_depth must be positive (metres)");

@@ -23,9 +23,12 @@ struct ObservedFrame {
   std::vector<float> angles;            ///< degrees
   std::vector<cv::Vec3b> colours;       ///< BGR
   std::vector<Descriptor> descriptors;
+  std::vector<bool>
+      is_movable;  ///< on a thing that could move but rests: helps with the pose, never mapped; empty = none
   FeatureGrid grid;  ///< over pixels
 
   std::size_t size() const { return pixels.size(); }
+  bool may_move(std::size_t point) const { return point < is_movable.size() && is_movable[point]; }
 };
 
 /// Depth limits of what is believed.
@@ -37,6 +40,10 @@ struct DepthOptions {
   /// Throws OptionsError naming the field.
   void validate() const;
 };
+
+/// Depth at a pixel of a depth image (CV_32FC1, metres); 0 where it is unknown, out of the limits, or where
+/// foreground and background meet.
+float depth_at(const cv::Mat& depth, const cv::Point2f& pixel, const DepthOptions& options);
 
 /// Joins features with the depth image (CV_32FC1 metres, 0 or NaN = unknown, may be empty) and removes lens
 /// distortion from their pixels. colour may be empty (points are grey then).

@@ -20,6 +20,11 @@ void require(bool condition, const char* message) {
   if (!condition) throw OptionsError(std::string("orb.") + message);
 }
 
+// Pixel centres, not corners, of a level lie on a grid of the full image.
+cv::Point2f to_full_image(const cv::Point2f& pixel, float scale) {
+  return (pixel + cv::Point2f(0.5F, 0.5F)) * scale - cv::Point2f(0.5F, 0.5F);
+}
+
 // Serves the cells of a grid in turns, strongest point first, until enough points are chosen.
 std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint>& points, const cv::Size& size, int wanted) {
   if (static_cast<int>(points.size()) <= wanted) return points;
@@ -129,19 +134,30 @@ std::vector<cv::KeyPoint> OrbExtractor::corners(const cv::Mat& level_image) cons
   return found;
 }
 
-std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyramid,
-                                               const cv::Mat& mask) const {
+std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyramid, const cv::Mat& mask,
+                                               std::vector<cv::Point2f>* removed) const {
   std::vector<cv::KeyPoint> all;
+  const double masked_share =
+      mask.empty() ? 0.0 : static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
   int surplus = 0;  // what coarser or finer levels could not fill is passed on
   for (std::size_t level = 0; level < pyramid.size(); ++level) {
     const float scale = scales_[level];
     auto points = corners(pyramid[level]);
     if (!mask.empty()) {
-      std::erase_if(points, [&](const cv::KeyPoint& p) {
+      const auto masked = std::stable_partition(points.begin(), points.end(), [&](const cv::KeyPoint& p) {
         const int x = std::min(static_cast<int>(std::lround(p.pt.x * scale)), mask.cols - 1);
         const int y = std::min(static_cast<int>(std::lround(p.pt.y * scale)), mask.rows - 1);
-        return mask.at<uchar>(y, x) != 0;
+        return mask.at<uchar>(y, x) == 0;
       });
+      if (removed != nullptr) {
+        std::vector<cv::KeyPoint> forbidden(masked, points.end());
+        const int share = static_cast<int>(std::lround(masked_share * quotas_[level]));
+        if (share > 0) {
+          for (const auto& p : spread(forbidden, pyramid[level].size(), share))
+            removed->push_back(to_full_image(p.pt, scale));
+        }
+      }
+      points.erase(masked, points.end());
     }
     const int wanted = quotas_[level] + surplus;
     points = spread(points, pyramid[level].size(), wanted);
@@ -150,15 +166,15 @@ std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyram
       point.angle = orientation(pyramid[level], point.pt, circle_);
       point.octave = static_cast<int>(level);
       point.size = static_cast<float>(2 * kPatchRadius + 1) * scale;
-      // Pixel centres, not corners, of a level lie on a grid of the full image.
-      point.pt = (point.pt + cv::Point2f(0.5F, 0.5F)) * scale - cv::Point2f(0.5F, 0.5F);
+      point.pt = to_full_image(point.pt, scale);
       all.push_back(point);
     }
   }
   return all;
 }
 
-std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat& mask) const {
+std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat& mask,
+                                              std::vector<cv::Point2f>* removed) const {
   if (grey.empty() || grey.type() != CV_8UC1) throw InputError("ORB extraction needs an 8-bit grey image");
   if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
     throw InputError("the mask of ORB extraction must be an 8-bit image of the size of the picture");
@@ -176,7 +192,7 @@ std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat
     cv::resize(pyramid.back(), smaller, size, 0, 0, cv::INTER_LINEAR);
     pyramid.push_back(smaller);
   }
-  std::vector<cv::KeyPoint> points = detect(pyramid, forbidden);
+  std::vector<cv::KeyPoint> points = detect(pyramid, forbidden, removed);
   cv::Mat descriptors;
   if (!points.empty()) describer_->compute(grey, points, descriptors);
   std::vector<OrbFeature> features(points.size());

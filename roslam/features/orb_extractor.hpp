@@ -40,8 +40,11 @@ class OrbExtractor {
   explicit OrbExtractor(const OrbOptions& options = {});
 
   /// grey: CV_8UC1. mask: empty, or CV_8UC1 of the same size, nonzero where no point may come from (eq. 11).
-  /// The result is ordered by level. Throws InputError for another type or a mask of another size.
-  std::vector<OrbFeature> extract(const cv::Mat& grey, const cv::Mat& mask = {}) const;
+  /// The result is ordered by level. removed: if not null, takes the corners that would have been points but
+  /// for the mask (pixels of the full-size image), about as dense as points are elsewhere. Throws InputError
+  /// for another type or a mask of another size.
+  std::vector<OrbFeature> extract(const cv::Mat& grey, const cv::Mat& mask = {},
+                                  std::vector<cv::Point2f>* removed = nullptr) const;
 
   const OrbOptions& options() const { return options_; }
   int levels() const { return options_.levels; }
@@ -50,7 +53,8 @@ class OrbExtractor {
   float scale(int level) const { return scales_[static_cast<std::size_t>(level)]; }
 
  private:
-  std::vector<cv::KeyPoint> detect(const std::vector<cv::Mat>& pyramid, const cv::Mat& mask) const;
+  std::vector<cv::KeyPoint> detect(const std::vector<cv::Mat>& pyramid, const cv::Mat& mask,
+                                   std::vector<cv::Point2f>* removed) const;
   std::vector<cv::KeyPoint> corners(const cv::Mat& level_image) const;
 
   OrbOptions options_;

@@ -20,7 +20,7 @@ LocalMapper::LocalMapper(const Camera& camera, Map& map, std::mutex& map_mutex, 
 KeyframeId LocalMapper::insert(const TrackedFrame& frame, std::size_t frame_index) {
   const KeyframeId id = map_.add_keyframe(frame_index, frame.timestamp, *frame.T_camera_world, frame.view);
   for (std::uint32_t i = 0; i < frame.landmarks.size(); ++i) {
-    if (!frame.landmarks[i].is_valid()) continue;
+    if (!frame.landmarks[i].is_valid() || frame.view->may_move(i)) continue;
     if (map_.add_observation(frame.landmarks[i], id, i)) map_.refresh(frame.landmarks[i]);
   }
   landmark_culler_.watch(landmarks_from_depth(map_, id, camera_, settings_.noise, settings_.landmarks));

@@ -11,11 +11,11 @@
 namespace roslam {
 
 namespace {
-// Points of a keyframe that show no landmark.
+// Points of a keyframe that show no landmark and may show one: nothing that can move becomes part of the map.
 std::vector<std::uint32_t> free_points(const Keyframe& keyframe) {
   std::vector<std::uint32_t> result;
   for (std::uint32_t i = 0; i < keyframe.landmarks.size(); ++i) {
-    if (!keyframe.landmarks[i].is_valid()) result.push_back(i);
+    if (!keyframe.landmarks[i].is_valid() && !keyframe.view->may_move(i)) result.push_back(i);
   }
   return result;
 }

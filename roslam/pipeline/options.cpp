@@ -9,6 +9,8 @@ void ThreadOptions::validate() const {
   if (frame_queue < 1 || frame_queue > 1000) throw OptionsError("threads.frame_queue must be 1 to 1000");
   if (keyframe_queue < 1 || keyframe_queue > 1000)
     throw OptionsError("threads.keyframe_queue must be 1 to 1000");
+  if (!(segmentation_timeout > 0.0 && segmentation_timeout <= 3600.0))
+    throw OptionsError("threads.segmentation_timeout must be above 0 and at most 3600 seconds");
 }
 
 void Options::validate() const {
@@ -16,6 +18,7 @@ void Options::validate() const {
   depth.validate();
   noise.validate();
   segmenter.validate();
+  removal.validate();
   matcher.validate();
   pose.validate();
   local_map.validate();
@@ -32,6 +35,8 @@ void Options::validate() const {
 Tracker::Settings Options::tracker_settings() const {
   return {tracker, matcher, pose, local_map, relocaliser, noise};
 }
+
+DynamicRemoval::Settings Options::removal_settings() const { return {removal, depth, noise, pose}; }
 
 LocalMapper::Settings Options::mapper_settings() const {
   return {landmarks, fusion, culling, bundle, matcher, noise};

@@ -8,6 +8,7 @@
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/geometry/reprojection.hpp"
 #include "roslam/mapping/local_mapper.hpp"
+#include "roslam/removal/dynamic_removal.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
 #include "roslam/tracking/keyframe_policy.hpp"
 #include "roslam/tracking/tracker.hpp"
@@ -23,6 +24,7 @@ enum class Mode {
 struct ThreadOptions {
   int frame_queue = 2;     ///< frames that may wait for the tracker in real-time mode; older ones are dropped
   int keyframe_queue = 3;  ///< keyframes that may wait for the mapper in real-time mode
+  double segmentation_timeout = 10.0;  ///< seconds a network may take for a frame before it is given up
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -34,6 +36,7 @@ struct Options {
   DepthOptions depth;
   MeasurementNoise noise;
   SegmenterOptions segmenter;
+  RemovalOptions removal;
   MatcherOptions matcher;
   PoseOptimiserOptions pose;
   LocalMapOptions local_map;
@@ -51,6 +54,7 @@ struct Options {
 
   Tracker::Settings tracker_settings() const;
   LocalMapper::Settings mapper_settings() const;
+  DynamicRemoval::Settings removal_settings() const;
 };
 
 /// Reads a configuration file (YAML); what it does not name keeps its default. Throws InputError for a file

@@ -23,6 +23,26 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("noise", "depth_sigma_growth", o.noise.depth_sigma_growth);
   visit("noise", "outlier_factor", o.noise.outlier_factor);
   visit("segmenter", "working_side", o.segmenter.working_side);
+  visit("removal", "labels", o.removal.labels);
+  visit("removal", "free_space", o.removal.free_space);
+  visit("removal", "flow", o.removal.flow);
+  visit("removal", "carry", o.removal.carry);
+  visit("removal", "refine", o.removal.refine);
+  visit("removal", "label_every", o.removal.label_every);
+  visit("removal", "max_labelled_share", o.removal.max_labelled_share);
+  visit("removal", "min_object_share", o.removal.min_object_share);
+  visit("removal", "sure", o.removal.sure);
+  visit("removal", "keep_missed", o.removal.keep_missed);
+  visit("removal", "history", o.removal.history);
+  visit("removal", "history_interval", o.removal.history_interval);
+  visit("removal", "depth_tolerance", o.removal.depth_tolerance);
+  visit("removal", "flow_interval", o.removal.flow_interval);
+  visit("removal", "flow_tolerance", o.removal.flow_tolerance);
+  visit("removal", "rest", o.removal.rest);
+  visit("removal", "growth", o.removal.growth);
+  visit("removal", "edge_band", o.removal.edge_band);
+  visit("removal", "margin", o.removal.margin);
+  visit("removal", "scarce_points", o.removal.scarce_points);
   visit("matcher", "max_distance", o.matcher.max_distance);
   visit("matcher", "strict_distance", o.matcher.strict_distance);
   visit("matcher", "ratio", o.matcher.ratio);
@@ -67,6 +87,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("bundle", "min_shared", o.bundle.min_shared);
   visit("threads", "frame_queue", o.threads.frame_queue);
   visit("threads", "keyframe_queue", o.threads.keyframe_queue);
+  visit("threads", "segmentation_timeout", o.threads.segmentation_timeout);
 }
 
 }  // namespace roslam

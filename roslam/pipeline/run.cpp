@@ -77,8 +77,8 @@ class PacedReader {
 
 class Runner {
  public:
-  Runner(Slam& slam, Segmenter* segmenter, const std::function<void(const FrameResult&)>& on_frame)
-      : slam_(slam), segmenter_(segmenter), on_frame_(on_frame) {}
+  using OnFrame = std::function<void(const Frame&, const FrameResult&)>;
+  Runner(Slam& slam, const OnFrame& on_frame) : slam_(slam), on_frame_(on_frame) {}
 
   void follow(FrameSource& source, const std::stop_token& stop) {
     while (!stop.stop_requested()) {
@@ -114,13 +114,12 @@ class Runner {
   RunSummary finish() {
     attempt([&] { slam_.finish(); });
     summary_.wall_seconds = seconds_since(start_);
-    if (labelled_ > 0) summary_.removed_share = removed_ / static_cast<double>(labelled_);
     return summary_;
   }
 
  private:
   void process(const Frame& frame) {
-    const auto result = slam_.process(frame, mask_for(frame));
+    const auto result = slam_.process(frame);
     if (!result) return;
     if (frame.depth.empty()) ++summary_.without_depth;
     if (frame.T_world_camera && frame.T_world_camera->is_finite()) {
@@ -130,33 +129,20 @@ class Runner {
       summary_.first_pose_seconds = seconds_since(start_);
       if (const double age = process_age(); age >= 0.0) summary_.start_up_seconds = age;
     }
-    if (on_frame_) on_frame_(*result);
-  }
-
-  // Frames that tracking refuses anyway are not labelled.
-  cv::Mat mask_for(const Frame& frame) {
-    if (segmenter_ == nullptr || frame.colour.empty() || frame.colour.type() != CV_8UC3) return {};
-    const Segmentation segmentation = segmenter_->segment(frame.colour);
-    const cv::Mat mask = movable_mask(segmentation.labels);
-    summary_.segmentation.add("segmentation", segmentation.seconds);
-    removed_ += static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
-    ++labelled_;
-    return mask;
+    if (on_frame_) on_frame_(frame, *result);
   }
 
   Slam& slam_;
-  Segmenter* segmenter_;
-  const std::function<void(const FrameResult&)>& on_frame_;
+  const OnFrame& on_frame_;
   Clock::time_point start_ = Clock::now();
   RunSummary summary_;
-  std::size_t labelled_ = 0;
-  double removed_ = 0.0;  // sum of the frames' shares
 };
 }  // namespace
 
-RunSummary run(FrameSource& source, Slam& slam, const std::function<void(const FrameResult&)>& on_frame,
-               const std::stop_token& stop, Segmenter* segmenter) {
-  Runner runner(slam, segmenter, on_frame);
+RunSummary run(FrameSource& source, Slam& slam,
+               const std::function<void(const Frame&, const FrameResult&)>& on_frame,
+               const std::stop_token& stop) {
+  Runner runner(slam, on_frame);
   runner.attempt([&] {
     slam.mode() == Mode::kDeterministic ? runner.follow(source, stop)
                                         : runner.follow_in_real_time(source, stop);

@@ -7,7 +7,6 @@
 #include <stop_token>
 
 #include "roslam/pipeline/slam.hpp"
-#include "roslam/semantics/segmenter.hpp"
 #include "roslam/sources/frame_source.hpp"
 
 namespace roslam {
@@ -20,18 +19,16 @@ struct RunSummary {
   double wall_seconds = 0.0;         ///< from the first read to the last result
   double first_pose_seconds = -1.0;  ///< from the first read to the first pose; negative = no pose
   double start_up_seconds = -1.0;  ///< from the start of the process to the first pose; negative = not known
-  StageTimes segmentation;         ///< processor time of labelling, where frames were labelled
-  double removed_share = 0.0;      ///< mean share of the pixels on things that may move, which gave no points
   Trajectory truth;                ///< true poses of the frames, where the source knows them
 };
 
 /// Feeds a source through the pipeline until it ends or a stop is requested; the frame in work is finished
 /// first. In real-time mode frames come at the pace of their timestamps on a thread of their own, and what
 /// the tracker has no time for is dropped; a gap in the timestamps is waited for no longer than a second.
-/// segmenter: labels each frame before it is tracked, and nothing labelled as movable gives points (eq. 11);
-/// null: nothing is removed. on_frame is called on the calling thread after each frame. What the source or
-/// the pipeline throws ends the run and is kept in the summary, so that results can still be written.
-RunSummary run(FrameSource& source, Slam& slam, const std::function<void(const FrameResult&)>& on_frame = {},
-               const std::stop_token& stop = {}, Segmenter* segmenter = nullptr);
+/// on_frame is called on the calling thread after each frame. What the source or the pipeline throws ends the
+/// run and is kept in the summary, so that results can still be written.
+RunSummary run(FrameSource& source, Slam& slam,
+               const std::function<void(const Frame&, const FrameResult&)>& on_frame = {},
+               const std::stop_token& stop = {});
 
 }  // namespace roslam

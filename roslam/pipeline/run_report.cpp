@@ -104,9 +104,9 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   json["interrupted"] = summary.interrupted;
   json["error"] = failure_json(summary.failure);
   json["frames"] = frames_json(slam, summary, source);
-  json["dynamic"] = {{"mode", description.segmentation_model.empty() ? "none" : "labels"},
+  json["dynamic"] = {{"mode", mode_of(slam.options().removal)},
                      {"model", description.segmentation_model},
-                     {"removed_share", rounded(summary.removed_share, 4)}};
+                     {"labelling_faults", counts_json(slam.labelling_faults())}};
   json["keyframes"] = slam.map().keyframe_count();
   json["landmarks"] = slam.map().landmark_count();
   json["path_length_metres"] = rounded(path_length(slam.trajectory()), 3);
@@ -115,9 +115,7 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   json["first_pose_seconds"] = rounded(summary.first_pose_seconds, 3);
   json["start_up_seconds"] = rounded(summary.start_up_seconds, 2);
   json["peak_memory_megabytes"] = rounded(static_cast<double>(peak_memory()) / 1048576.0, 1);
-  StageTimes times = slam.times();
-  times.add_all(summary.segmentation);
-  json["processor_milliseconds"] = times_json(times);
+  json["processor_milliseconds"] = times_json(slam.times());
   json["camera"] = camera_json(slam.camera());
   json["camera"]["name"] = description.camera;
   json["options"] = Json::parse(options_to_json(slam.options()));

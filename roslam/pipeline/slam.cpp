@@ -26,10 +26,12 @@ std::vector<float> level_scales(const OrbExtractor& extractor) {
 }
 }  // namespace
 
-Slam::Slam(const Camera& camera, const Options& options, Mode mode)
+Slam::Slam(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter)
     : camera_(validated(camera)),
       options_(validated(options)),
       mode_(mode),
+      segmentation_(options.removal.labels ? std::move(segmenter) : nullptr, mode, options.threads),
+      removal_(camera, options.removal_settings()),
       extractor_(options.orb),
       map_(level_scales(extractor_)),
       tracker_(camera, map_, options.tracker_settings()),
@@ -40,11 +42,17 @@ Slam::Slam(const Camera& camera, const Options& options, Mode mode)
 std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask) {
   if (!is_usable(frame)) return std::nullopt;
   const Stopwatch watch;
-  const auto view = extract(frame, mask);
-  const double extract_seconds = watch.seconds();
+  FrameResult result;
+  cv::Mat grey;
+  cv::cvtColor(frame.colour, grey, cv::COLOR_BGR2GRAY);
+  result.removal = find_movables(frame, grey);
+  const double removal_seconds = watch.seconds();
+  const auto view = extract(frame, grey, mask, result);
+  const double extract_seconds = watch.seconds() - removal_seconds;
 
   std::unique_lock map_lock(map_mutex_);
-  TrackedFrame tracked = tracker_.track(view, frame.timestamp);
+  TrackedFrame tracked = tracker_.track(view, frame.timestamp, result.removal.T_camera_world);
+  tracked.hidden = count_hidden(tracked, result.removal.mask);
   KeyframeId keyframe;
   if (mapping_.has_room() && keyframe_policy_.promotes(tracked, map_, mapping_.is_idle())) {
     keyframe = mapper_.insert(tracked, frame.index);
@@ -56,12 +64,17 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
   map_lock.unlock();
 
   const double seconds = watch.seconds();
-  note_times(extract_seconds, seconds);
+  note_times(removal_seconds, extract_seconds, seconds);
   if (keyframe.is_valid()) mapping_.submit(keyframe);
 
-  FrameResult result{frame.index,     frame.timestamp,     tracked.state, std::nullopt,
-                     tracked.inliers, keyframe.is_valid(), seconds};
+  result.index = frame.index;
+  result.timestamp = frame.timestamp;
+  result.state = tracked.state;
+  result.inliers = last_inliers_ = tracked.inliers;
+  result.is_keyframe = keyframe.is_valid();
+  result.tracking_seconds = seconds;
   if (tracked.T_camera_world) result.T_world_camera = tracked.T_camera_world->inverse();
+  if (removes()) removal_.remember(tracked.T_camera_world, result.points, result.removed_points);
   return result;
 }
 
@@ -85,12 +98,66 @@ bool Slam::is_usable(const Frame& frame) {
   return true;
 }
 
-std::shared_ptr<const ObservedFrame> Slam::extract(const Frame& frame, const cv::Mat& mask) {
-  cv::Mat grey;
-  cv::cvtColor(frame.colour, grey, cv::COLOR_BGR2GRAY);
-  const auto features = extractor_.extract(grey, mask);
-  return std::make_shared<ObservedFrame>(
-      observe(features, frame.colour, frame.depth, camera_, options_.depth));
+bool Slam::removes() const {
+  return segmentation_.is_on() || options_.removal.free_space || options_.removal.flow;
+}
+
+Removal Slam::find_movables(const Frame& frame, const cv::Mat& grey) {
+  if (!removes()) return {};
+  std::optional<SE3> predicted;
+  {
+    const std::scoped_lock lock(map_mutex_);
+    predicted = tracker_.predicted_pose(frame.timestamp);
+  }
+  const auto every = static_cast<std::size_t>(options_.removal.label_every);
+  if (mode_ == Mode::kRealTime || frames() % every == 0) segmentation_.offer(frame.index, frame.colour);
+  return removal_.find(frame, grey, predicted, segmentation_.take());
+}
+
+std::shared_ptr<const ObservedFrame> Slam::extract(const Frame& frame, const cv::Mat& grey,
+                                                   const cv::Mat& mask, FrameResult& result) {
+  cv::Mat forbidden = result.removal.mask;
+  // Where little else is left, things that could move but rest will do for the moment.
+  const bool is_scarce = frames() > 0 && last_inliers_ < options_.removal.scarce_points;
+  const cv::Mat resting = is_scarce ? result.removal.resting : cv::Mat();
+  if (!resting.empty()) forbidden = forbidden & ~resting;
+  if (!mask.empty()) forbidden = forbidden.empty() ? mask : cv::Mat(forbidden | mask);
+  const auto features = extractor_.extract(grey, forbidden, &result.removed_points);
+  for (const auto& feature : features) result.points.push_back(feature.pixel);
+  auto view =
+      std::make_shared<ObservedFrame>(observe(features, frame.colour, frame.depth, camera_, options_.depth));
+  if (!resting.empty()) {
+    for (const auto& feature : features) {
+      const cv::Point pixel(std::min(cvRound(feature.pixel.x), resting.cols - 1),
+                            std::min(cvRound(feature.pixel.y), resting.rows - 1));
+      view->is_movable.push_back(resting.at<std::uint8_t>(pixel) != 0);
+    }
+  }
+  return view;
+}
+
+std::map<std::string, std::size_t> Slam::labelling_faults() const {
+  auto faults = segmentation_.faults();
+  for (const auto& [reason, count] : removal_.faults()) faults[reason] += count;
+  return faults;
+}
+
+// Landmarks of the reference keyframe that would be seen where the mask is.
+int Slam::count_hidden(const TrackedFrame& frame, const cv::Mat& mask) const {
+  const Keyframe* reference = map_.find(frame.reference);
+  if (mask.empty() || reference == nullptr || !frame.T_camera_world) return 0;
+  int hidden = 0;
+  for (const LandmarkId id : reference->landmarks) {
+    const Landmark* landmark = map_.find(id);
+    if (landmark == nullptr) continue;
+    const Eigen::Vector3d point = *frame.T_camera_world * landmark->position;
+    if (point.z() <= 0.0) continue;
+    const Eigen::Vector2d pixel = camera_.distort(camera_.project(point));
+    const int x = static_cast<int>(std::lround(pixel.x()));
+    const int y = static_cast<int>(std::lround(pixel.y()));
+    if (x >= 0 && y >= 0 && x < mask.cols && y < mask.rows && mask.at<std::uint8_t>(y, x) != 0) ++hidden;
+  }
+  return hidden;
 }
 
 void Slam::record(const TrackedFrame& frame) {
@@ -103,8 +170,9 @@ void Slam::record(const TrackedFrame& frame) {
   records_.push_back(record);
 }
 
-void Slam::note_times(double extract, double total) {
+void Slam::note_times(double removal, double extract, double total) {
   const Tracker::Times& t = tracker_.times();
+  if (removes()) times_.add("tracking.removal", removal);
   times_.add("tracking.extract", extract);
   times_.add("tracking.match_frame", t.match_frame);
   times_.add("tracking.match_map", t.match_map);
@@ -137,6 +205,7 @@ Trajectory Slam::keyframes() const {
 StageTimes Slam::times() const {
   StageTimes all = times_;
   all.add_all(mapping_.times());
+  all.add_all(segmentation_.times());
   return all;
 }
 

@@ -15,7 +15,9 @@
 #include "roslam/mapping/local_mapper.hpp"
 #include "roslam/pipeline/mapping_worker.hpp"
 #include "roslam/pipeline/options.hpp"
+#include "roslam/pipeline/segmentation_worker.hpp"
 #include "roslam/pipeline/statistics.hpp"
+#include "roslam/removal/dynamic_removal.hpp"
 #include "roslam/sources/frame_source.hpp"
 #include "roslam/tracking/keyframe_policy.hpp"
 #include "roslam/tracking/tracker.hpp"
@@ -30,18 +32,22 @@ struct FrameResult {
   std::optional<SE3> T_world_camera;  ///< as known now; later corrections show in Slam::trajectory()
   int inliers = 0;                    ///< landmarks the pose rests on
   bool is_keyframe = false;
-  double tracking_seconds = 0.0;  ///< processor time of the tracking thread
+  double tracking_seconds = 0.0;            ///< processor time of the tracking thread
+  Removal removal;                          ///< what was found to move
+  std::vector<cv::Point2f> points;          ///< corners that were used, pixels of the image as taken
+  std::vector<cv::Point2f> removed_points;  ///< corners that would have been, but for the removal
 };
 
 /// The pipeline: frames in, trajectory and map out.
 class Slam {
  public:
-  /// Throws CalibrationError or OptionsError.
-  Slam(const Camera& camera, const Options& options = {}, Mode mode = Mode::kDeterministic);
+  /// segmenter: labels frames on a thread of its own, null: none. Throws CalibrationError or OptionsError.
+  Slam(const Camera& camera, const Options& options = {}, Mode mode = Mode::kDeterministic,
+       std::shared_ptr<Segmenter> segmenter = nullptr);
 
   /// Tracks a frame and, if it becomes a keyframe, maps it (in real-time mode: on another thread). mask:
-  /// empty, or CV_8UC1 of the frame's size, nonzero where nothing may be used (things that can move). Frames
-  /// that cannot be used (wrong size or type, time not increasing) give nothing and are counted.
+  /// empty, or CV_8UC1 of the frame's size, nonzero where nothing may be used, beside what is found to move.
+  /// Frames that cannot be used (wrong size or type, time not increasing) give nothing and are counted.
   std::optional<FrameResult> process(const Frame& frame, const cv::Mat& mask = {});
 
   /// Waits for the mapper. Call before reading results.
@@ -65,6 +71,9 @@ class Slam {
   const std::map<std::string, std::size_t>& rejected() const { return rejected_; }
   std::size_t frames() const { return records_.size(); }
 
+  /// What went wrong with labelling so far, in words, and how often.
+  std::map<std::string, std::size_t> labelling_faults() const;
+
   /// Processor time of every stage so far.
   StageTimes times() const;
 
@@ -77,13 +86,19 @@ class Slam {
   };
 
   bool is_usable(const Frame& frame);
-  std::shared_ptr<const ObservedFrame> extract(const Frame& frame, const cv::Mat& mask);
+  Removal find_movables(const Frame& frame, const cv::Mat& grey);
+  std::shared_ptr<const ObservedFrame> extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& mask,
+                                               FrameResult& result);
+  int count_hidden(const TrackedFrame& frame, const cv::Mat& mask) const;
   void record(const TrackedFrame& frame);
-  void note_times(double extract, double total);
+  void note_times(double removal, double extract, double total);
+  bool removes() const;
 
   Camera camera_;
   Options options_;
   Mode mode_;
+  SegmentationWorker segmentation_;
+  DynamicRemoval removal_;
   OrbExtractor extractor_;
   std::mutex map_mutex_;
   Map map_;
@@ -94,6 +109,7 @@ class Slam {
   std::map<TrackingState, std::size_t> frames_by_state_;
   std::map<std::string, std::size_t> rejected_;
   std::optional<double> last_timestamp_;
+  int last_inliers_ = 0;
   StageTimes times_;
   MappingWorker mapping_;  // last, so that its thread stops before what it uses goes away
 };

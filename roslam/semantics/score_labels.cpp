@@ -78,8 +78,8 @@ struct Grid {
   }
 };
 
-// The probability of a point's best class is its share in the softmax.
-std::array<float, kClasses> mean_probabilities(const Grid& grid) {
+// The probability of each point's best class is its share in the softmax.
+cv::Mat probabilities(const Grid& grid) {
   const cv::Mat highest(1, static_cast<int>(grid.points()), CV_32F, const_cast<float*>(grid.highest.data()));
   cv::Mat sum = cv::Mat::zeros(highest.size(), CV_32F);
   cv::Mat share;
@@ -88,11 +88,16 @@ std::array<float, kClasses> mean_probabilities(const Grid& grid) {
     cv::exp(share, share);
     sum += share;
   }
+  return cv::Mat(1.0 / sum).reshape(1, grid.rows);
+}
+
+std::array<float, kClasses> means_by_class(const Grid& grid, const cv::Mat& probability) {
+  const auto* of_point = probability.ptr<float>();
   std::array<double, kClasses> sums{};
   std::array<int, kClasses> counts{};
   for (std::size_t i = 0; i < grid.points(); ++i) {
     const auto c = static_cast<std::size_t>(grid.best[i]);
-    sums[c] += 1.0 / static_cast<double>(sum.at<float>(static_cast<int>(i)));
+    sums[c] += static_cast<double>(of_point[i]);
     ++counts[c];
   }
   std::array<float, kClasses> means{};
@@ -141,7 +146,8 @@ Segmentation labels_from_scores(const cv::Mat& scores, const cv::Size& size) {
                  result.labels.ptr<std::uint8_t>(y));
     }
   }
-  result.confidence = mean_probabilities(grid);
+  result.probability = probabilities(grid);
+  result.confidence = means_by_class(grid, result.probability);
   return result;
 }
 

@@ -13,7 +13,8 @@ struct Segmentation {
   cv::Mat labels;                            ///< CV_8UC1 of the picture's size: class 0..18 of each pixel
   std::array<float, kClasses> confidence{};  ///< mean probability of each class where it was chosen, 0 where
                                              ///< it has no point of the network's grid
-  double seconds = 0.0;                      ///< processor time from picture to labels
+  cv::Mat probability;   ///< CV_32FC1, of the class chosen, on a coarse grid over the picture; may be empty
+  double seconds = 0.0;  ///< processor time from picture to labels
 };
 
 /// Labels every pixel of a picture. Not safe to call from several threads at once; give each its own.

@@ -47,7 +47,8 @@ bool KeyframePolicy::promotes(const TrackedFrame& frame, const Map& map, bool ma
     ++(frame.landmarks[i].is_valid() ? tracked_near : new_near);
   }
   const bool needs_near = tracked_near < options_.min_tracked_near && new_near > options_.min_new_near;
-  const int reference = landmarks_of(map, frame.reference);
+  // What something that moves hides for the moment is not a part of the scene that has not been mapped.
+  const int reference = landmarks_of(map, frame.reference) - frame.hidden;
   const bool little_overlap = frame.inliers < options_.min_overlap * reference;
   const bool weak = frame.inliers < 0.25 * reference || needs_near;
   const bool due = elapsed >= options_.max_interval;

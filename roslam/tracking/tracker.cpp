@@ -62,7 +62,8 @@ Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
   settings.noise.validate();
 }
 
-TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double timestamp) {
+TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double timestamp,
+                            const std::optional<SE3>& T_camera_world) {
   times_ = {};
   TrackedFrame frame;
   frame.timestamp = timestamp;
@@ -70,8 +71,8 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   frame.view = std::move(view);
   if (map_.keyframe_count() == 0) return initialise(std::move(frame));
 
-  const bool found =
-      state_ == TrackingState::kTracking ? follow(frame) || relocalise(frame) : relocalise(frame);
+  const bool found = state_ == TrackingState::kTracking ? follow(frame, T_camera_world) || relocalise(frame)
+                                                        : relocalise(frame);
   if (found) {
     state_ = TrackingState::kTracking;
     frames_lost_ = 0;
@@ -102,13 +103,18 @@ TrackedFrame Tracker::initialise(TrackedFrame frame) {
   return frame;
 }
 
-bool Tracker::follow(TrackedFrame& frame) {
-  const SE3 predicted = predict_pose(frame.timestamp);
+std::optional<SE3> Tracker::predicted_pose(double timestamp) const {
+  if (state_ != TrackingState::kTracking || map_.keyframe_count() == 0) return std::nullopt;
+  return predict_pose(timestamp);
+}
+
+bool Tracker::follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_world) {
+  const SE3 predicted = T_camera_world.value_or(predict_pose(frame.timestamp));
   constexpr float kWider = 3.0F;
   // Where the motion is unknown, what lies near in the image may be the wrong thing: descriptors alone
   // decide.
-  const bool matched = (velocity_ && match_last_frame(frame, predicted, 1.0F)) || match_reference(frame) ||
-                       match_last_frame(frame, predicted, kWider);
+  const bool matched = ((velocity_ || T_camera_world) && match_last_frame(frame, predicted, 1.0F)) ||
+                       match_reference(frame) || match_last_frame(frame, predicted, kWider);
   return matched && refine_with_local_map(frame);
 }
 

@@ -8,11 +8,11 @@
 
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/pose_optimiser.hpp"
 #include "roslam/geometry/reprojection.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "roslam/map/map.hpp"
 #include "roslam/tracking/local_map.hpp"
-#include "roslam/tracking/pose_optimiser.hpp"
 #include "roslam/tracking/projection_matcher.hpp"
 #include "roslam/tracking/relocaliser.hpp"
 
@@ -46,6 +46,7 @@ struct TrackedFrame {
   std::optional<SE3> T_camera_world;  ///< empty unless state is kTracking
   std::vector<LandmarkId> landmarks;  ///< landmark each point shows, or none; inliers only
   int inliers = 0;                    ///< landmarks the pose rests on
+  int hidden = 0;                     ///< landmarks of the reference that lie behind what was removed
   KeyframeId reference;               ///< keyframe that shares most landmarks; none before the first keyframe
 };
 
@@ -65,8 +66,13 @@ class Tracker {
 
   Tracker(const Camera& camera, Map& map, const Settings& settings);
 
-  /// Frames must come in the order of time.
-  TrackedFrame track(std::shared_ptr<const ObservedFrame> view, double timestamp);
+  /// Frames must come in the order of time. T_camera_world: a better guess than predicted_pose().
+  TrackedFrame track(std::shared_ptr<const ObservedFrame> view, double timestamp,
+                     const std::optional<SE3>& T_camera_world = {});
+
+  /// T_camera_world at that time as the motion so far suggests it; nothing unless the pose was known a moment
+  /// ago.
+  std::optional<SE3> predicted_pose(double timestamp) const;
 
   /// Tells that the frame tracked last became this keyframe (its landmarks are taken over).
   void promoted(KeyframeId keyframe);
@@ -84,7 +90,7 @@ class Tracker {
 
  private:
   TrackedFrame initialise(TrackedFrame frame);
-  bool follow(TrackedFrame& frame);
+  bool follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_world);
   bool match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor);
   bool match_reference(TrackedFrame& frame);
   bool refine_with_local_map(TrackedFrame& frame);

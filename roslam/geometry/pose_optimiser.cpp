@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/tracking/pose_optimiser.hpp"
+#include "roslam/geometry/pose_optimiser.hpp"
 
 #include <Eigen/Cholesky>
 #include <cmath>

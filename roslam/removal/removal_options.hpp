@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+namespace roslam {
+
+/// How things that move are found and removed (section 3.2, eq. 11, and what the paper leaves open).
+struct RemovalOptions {
+  // What is consulted.
+  bool labels = true;      ///< a network's labels of persons, cars and bicycles; needs a Segmenter
+  bool free_space = true;  ///< depth: what stands where earlier frames saw through has moved there
+  bool flow = true;        ///< sparse optical flow: what moves otherwise than the camera makes it seem
+  bool carry = true;   ///< masks follow their things from frame to frame; false: labels count for their frame
+  bool refine = true;  ///< masks are fitted to the edges of depth; false: as the network drew them
+
+  // Labels.
+  int label_every = 1;              ///< frames; in deterministic mode every n-th is labelled
+  double max_labelled_share = 0.9;  ///< of the picture; a network that labels more as movable is not believed
+  double min_object_share = 0.0005;  ///< of the picture; smaller things are not told apart from noise
+  double sure = 0.65;                ///< mean probability from which a label is believed against quick doubts
+  double keep_missed = 0.5;          ///< seconds that a thing is kept which newer labels miss
+
+  // Geometry.
+  double history = 2.5;            ///< seconds of depth that a frame is compared with
+  double history_interval = 0.25;  ///< seconds between two depth images that are kept
+  double depth_tolerance = 0.03;   ///< share of the depth, beside three sigmas of its noise, that may be off
+  double flow_interval = 0.13;     ///< seconds over which points are followed to see whether they move
+  double flow_tolerance = 3.5;     ///< sigmas a point may be off where a point at rest would be
+  double rest = 2.0;  ///< seconds without motion after which a surely labelled thing counts as at rest
+
+  // From evidence to mask.
+  double growth = 0.15;  ///< metres that a mask grows at most along the surface of the thing
+  int edge_band = 10;    ///< pixels around the border of a mask within which depth decides what belongs to it
+  int margin = 4;        ///< pixels by which the finished mask is dilated
+
+  // When most of the view moves.
+  int scarce_points = 100;  ///< static points below which those on things at rest help for the moment
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+
+  bool is_on() const { return labels || free_space || flow; }
+};
+
+/// What `--dynamic` knows: none, labels, geometry, both. Nothing for another name.
+std::optional<RemovalOptions> removal_from(std::string_view mode, const RemovalOptions& base = {});
+
+/// The name of the mode that these options come closest to.
+std::string_view mode_of(const RemovalOptions& options);
+
+}  // namespace roslam
