@@ -44,6 +44,7 @@ struct Landmark {
   KeyframeId created_by;
   std::uint32_t predicted = 0;  ///< frames that should have seen it
   std::uint32_t found = 0;      ///< frames that did
+  std::uint32_t contradicted = 0;  ///< frames that saw it on something that moves, or saw through it
   cv::Vec3b colour;             ///< BGR
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/mapping/culling.hpp"
 
+#include <cmath>
+
 #include "roslam/error.hpp"
 
 namespace roslam {
@@ -29,6 +31,30 @@ bool is_redundant(const Map& map, const Keyframe& keyframe, const CullingOptions
       ++well_seen;
   }
   return well_seen > options.redundant_share * landmarks;
+}
+
+// True if a frame shows something that moves at a landmark's place, or a surface behind it.
+bool is_contradicted(const Eigen::Vector3d& point, const Eigen::Vector2d& pixel, const Contradiction& frame,
+                     const MeasurementNoise& noise) {
+  constexpr int kAround = 2;  // pixels: at the edges of things nothing is sure
+  if (!pixel.allFinite()) return false;
+  const cv::Point centre(cvRound(pixel.x()), cvRound(pixel.y()));
+  if (centre.x < kAround || centre.y < kAround || centre.x + kAround >= frame.depth.cols ||
+      centre.y + kAround >= frame.depth.rows) {
+    return false;
+  }
+  const double tolerance = 3.0 * noise.sigma_of_depth(point.z()) + 0.02 * point.z();
+  bool is_through = true;
+  for (int y = centre.y - kAround; y <= centre.y + kAround; ++y) {
+    for (int x = centre.x - kAround; x <= centre.x + kAround; ++x) {
+      const auto z = static_cast<double>(frame.depth.at<float>(y, x));
+      is_through = is_through && z > point.z() + 2.0 * tolerance;
+    }
+  }
+  if (is_through) return true;
+  const auto z = static_cast<double>(frame.depth.at<float>(centre));
+  return !frame.moving.empty() && frame.moving.at<std::uint8_t>(centre) != 0 && z > 0.0 &&
+         std::abs(z - point.z()) < tolerance;
 }
 }  // namespace
 
@@ -65,6 +91,27 @@ int LandmarkCuller::cull(Map& map, KeyframeId newest) {
     }
   }
   watched_ = std::move(still_watched);
+  return removed;
+}
+
+int cull_contradicted(Map& map, const std::vector<LandmarkId>& landmarks, const Camera& camera,
+                      const SE3& T_camera_world, const Contradiction& frame, const MeasurementNoise& noise) {
+  if (frame.depth.empty()) return 0;
+  int removed = 0;
+  for (const LandmarkId id : landmarks) {
+    Landmark* landmark = map.find(id);
+    if (landmark == nullptr) continue;
+    const Eigen::Vector3d point = T_camera_world * landmark->position;
+    if (point.z() <= 0.0) continue;
+    if (!is_contradicted(point, camera.distort(camera.project(point)), frame, noise)) continue;
+    ++landmark->contradicted;
+    constexpr std::uint32_t kOften = 3;  // frames
+    constexpr double kShare = 0.25;      // of the frames that found it
+    if (landmark->contradicted >= kOften && landmark->contradicted > kShare * landmark->found) {
+      map.remove_landmark(id);
+      ++removed;
+    }
+  }
   return removed;
 }
 

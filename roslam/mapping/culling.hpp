@@ -2,8 +2,11 @@
 #pragma once
 
 #include <deque>
+#include <opencv2/core.hpp>
 #include <vector>
 
+#include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/reprojection.hpp"
 #include "roslam/map/map.hpp"
 
 namespace roslam {
@@ -34,6 +37,17 @@ class LandmarkCuller {
   CullingOptions options_;
   std::deque<LandmarkId> watched_;
 };
+
+/// What a frame shows that speaks against landmarks: images as taken.
+struct Contradiction {
+  const cv::Mat& moving;  ///< CV_8UC1, nonzero on what moves; may be empty
+  const cv::Mat& depth;   ///< CV_32FC1, metres, 0 = unknown; may be empty
+};
+
+/// Removes those of the landmarks that lie on what moves, or that the frame sees through, in several frames:
+/// they were parts of something that moved. Returns how many. Nothing is decided where depth is unknown.
+int cull_contradicted(Map& map, const std::vector<LandmarkId>& landmarks, const Camera& camera,
+                      const SE3& T_camera_world, const Contradiction& frame, const MeasurementNoise& noise);
 
 /// Removes the keyframes around one that add nothing: nearly all their landmarks are seen by enough others at
 /// the same or a finer level. The first keyframe stays. Returns how many were removed.

@@ -63,6 +63,10 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("tracker", "min_inliers", o.tracker.min_inliers);
   visit("tracker", "min_frame_matches", o.tracker.min_frame_matches);
   visit("tracker", "min_agreement", o.tracker.min_agreement);
+  visit("tracker", "trusted_inliers", o.tracker.trusted_inliers);
+  visit("tracker", "scarce_inliers", o.tracker.scarce_inliers);
+  visit("tracker", "hidden_share", o.tracker.hidden_share);
+  visit("tracker", "max_predicted", o.tracker.max_predicted);
   visit("tracker", "recently_lost_frames", o.tracker.recently_lost_frames);
   visit("keyframes", "max_interval", o.keyframes.max_interval);
   visit("keyframes", "min_interval", o.keyframes.min_interval);

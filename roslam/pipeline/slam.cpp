@@ -50,9 +50,13 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
   const auto view = extract(frame, grey, mask, result);
   const double extract_seconds = watch.seconds() - removal_seconds;
 
+  const cv::Mat& removed = result.removal.mask;
+  const double hidden_share =
+      removed.empty() ? 0.0 : cv::countNonZero(removed) / static_cast<double>(removed.total());
+
   std::unique_lock map_lock(map_mutex_);
-  TrackedFrame tracked = tracker_.track(view, frame.timestamp, result.removal.T_camera_world);
-  tracked.hidden = count_hidden(tracked, result.removal.mask);
+  TrackedFrame tracked = tracker_.track(view, frame.timestamp, {result.removal.T_camera_world, hidden_share});
+  tracked.hidden = count_hidden(tracked, removed);
   KeyframeId keyframe;
   if (mapping_.has_room() && keyframe_policy_.promotes(tracked, map_, mapping_.is_idle())) {
     keyframe = mapper_.insert(tracked, frame.index);
@@ -61,6 +65,7 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
     tracked.reference = keyframe;
   }
   record(tracked);
+  cull_contradicted(tracked, frame, result.removal);
   map_lock.unlock();
 
   const double seconds = watch.seconds();
@@ -71,10 +76,14 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
   result.timestamp = frame.timestamp;
   result.state = tracked.state;
   result.inliers = last_inliers_ = tracked.inliers;
+  result.trust = tracked.trust;
   result.is_keyframe = keyframe.is_valid();
   result.tracking_seconds = seconds;
   if (tracked.T_camera_world) result.T_world_camera = tracked.T_camera_world->inverse();
-  if (removes()) removal_.remember(tracked.T_camera_world, result.points, result.removed_points);
+  if (removes()) {
+    const bool is_measured = tracked.state == TrackingState::kTracking;
+    removal_.remember(is_measured ? tracked.T_camera_world : std::nullopt, result.points, result.removed_points);
+  }
   return result;
 }
 
@@ -140,6 +149,18 @@ std::map<std::string, std::size_t> Slam::labelling_faults() const {
   auto faults = segmentation_.faults();
   for (const auto& [reason, count] : removal_.faults()) faults[reason] += count;
   return faults;
+}
+
+// What came into the map before it was known to move goes.
+void Slam::cull_contradicted(const TrackedFrame& frame, const Frame& images, const Removal& removal) {
+  if (!removes() || frame.state != TrackingState::kTracking) return;
+  cv::Mat moving;
+  for (const auto& object : removal.objects) {
+    if (moving.empty()) moving = cv::Mat::zeros(images.colour.size(), CV_8UC1);
+    paint(object, moving);
+  }
+  roslam::cull_contradicted(map_, tracker_.local_landmarks(), camera_, *frame.T_camera_world,
+                            {moving, images.depth}, options_.noise);
 }
 
 // Landmarks of the reference keyframe that would be seen where the mask is.

@@ -31,6 +31,7 @@ struct FrameResult {
   TrackingState state = TrackingState::kInitialising;
   std::optional<SE3> T_world_camera;  ///< as known now; later corrections show in Slam::trajectory()
   int inliers = 0;                    ///< landmarks the pose rests on
+  double trust = 0.0;  ///< in the pose, 0 (predicted or unknown) to 1
   bool is_keyframe = false;
   double tracking_seconds = 0.0;            ///< processor time of the tracking thread
   Removal removal;                          ///< what was found to move
@@ -89,6 +90,7 @@ class Slam {
   Removal find_movables(const Frame& frame, const cv::Mat& grey);
   std::shared_ptr<const ObservedFrame> extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& mask,
                                                FrameResult& result);
+  void cull_contradicted(const TrackedFrame& frame, const Frame& images, const Removal& removal);
   int count_hidden(const TrackedFrame& frame, const cv::Mat& mask) const;
   void record(const TrackedFrame& frame);
   void note_times(double removal, double extract, double total);

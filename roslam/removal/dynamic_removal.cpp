@@ -90,16 +90,30 @@ DynamicRemoval::Scene DynamicRemoval::gather_evidence() const {
   } else {
     scene.space = {cv::Mat::zeros(grid_.size(), CV_8UC1), cv::Mat::zeros(grid_.size(), CV_32FC1)};
   }
-  scene.moving = cells_that_are(Evidence::kMoving, scene.space);
   if (const PastFrame* past = options.flow ? anchor() : nullptr) {
     scene.flow = flow_.follow(*past, current_);
-    for (const auto& point : flow_.in_company(scene.flow)) {
-      cv::circle(scene.moving, grid_.cell_of(point), 1, 255, cv::FILLED);
-    }
+    drop_contradicted(scene.space, scene.flow);
+  }
+  scene.moving = cells_that_are(Evidence::kMoving, scene.space);
+  for (const auto& point : flow_.in_company(scene.flow)) {
+    cv::circle(scene.moving, grid_.cell_of(point), 1, 255, cv::FILLED);
   }
   scene.owners = cv::Mat::zeros(grid_.size(), CV_32SC1);
   scene.seeds = scene.moving.clone();
   return scene;
+}
+
+// Depth holds for moving what a pose that went astray, or a bad reading, sets apart; points that were followed over it
+// and are at rest show that it is not.
+void DynamicRemoval::drop_contradicted(FreeSpaceEvidence& space, const FollowedPoints& flow) const {
+  cv::Mat numbers;
+  const int count = cv::connectedComponents(cells_that_are(Evidence::kMoving, space), numbers, 8, CV_32S);
+  const auto evidence = evidence_by_owner(numbers, static_cast<std::size_t>(count), space, flow, grid_,
+                                          settings_.removal);
+  for (int n = 1; n < count; ++n) {
+    if (!contradicts_motion(evidence[static_cast<std::size_t>(n)])) continue;
+    space.state.setTo(static_cast<int>(Evidence::kUnknown), numbers == n);
+  }
 }
 
 const PastFrame* DynamicRemoval::past_frame(std::size_t index) const {

@@ -68,6 +68,7 @@ class DynamicRemoval {
 
   void begin(const Frame& frame, const cv::Mat& grey, const std::optional<SE3>& predicted_T_camera_world);
   Scene gather_evidence() const;
+  void drop_contradicted(FreeSpaceEvidence& space, const FollowedPoints& flow) const;
   std::optional<std::vector<MovableObject>> usable_objects(const LabelledFrame& labels);
   void claim(Scene& scene, const std::vector<MovableObject>& before) const;
   void weigh(Scene& scene);

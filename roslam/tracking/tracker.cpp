@@ -30,6 +30,8 @@ std::string_view name_of(TrackingState state) {
       return "initialising";
     case TrackingState::kTracking:
       return "tracking";
+    case TrackingState::kPredicted:
+      return "predicted";
     case TrackingState::kRecentlyLost:
       return "recently lost";
     case TrackingState::kLost:
@@ -44,6 +46,11 @@ void TrackerOptions::validate() const {
   if (min_frame_matches < 6) throw OptionsError("tracker.min_frame_matches must be at least 6");
   if (!(min_agreement >= 0.0 && min_agreement <= 1.0))
     throw OptionsError("tracker.min_agreement must be 0 to 1");
+  if (trusted_inliers < 1) throw OptionsError("tracker.trusted_inliers must be at least 1");
+  if (scarce_inliers < 0) throw OptionsError("tracker.scarce_inliers must not be negative");
+  if (!(hidden_share >= 0.0 && hidden_share <= 1.0)) throw OptionsError("tracker.hidden_share must be 0 to 1");
+  if (!(max_predicted >= 0.0 && max_predicted <= 60.0))
+    throw OptionsError("tracker.max_predicted must be 0 to 60 seconds");
   if (recently_lost_frames < 0) throw OptionsError("tracker.recently_lost_frames must not be negative");
 }
 
@@ -63,21 +70,26 @@ Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
 }
 
 TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double timestamp,
-                            const std::optional<SE3>& T_camera_world) {
+                            const FrameHint& hint) {
   times_ = {};
+  passing_points_.clear();
+  passing_positions_.clear();
   TrackedFrame frame;
   frame.timestamp = timestamp;
   frame.landmarks.resize(view->size());
   frame.view = std::move(view);
   if (map_.keyframe_count() == 0) return initialise(std::move(frame));
 
-  const bool found = state_ == TrackingState::kTracking ? follow(frame, T_camera_world) || relocalise(frame)
-                                                        : relocalise(frame);
+  const bool was_known = state_ == TrackingState::kTracking || state_ == TrackingState::kPredicted;
+  const bool found = (was_known && follow(frame, hint.T_camera_world)) || relocalise(frame);
   if (found) {
     state_ = TrackingState::kTracking;
     frames_lost_ = 0;
+    frame.trust = std::min(1.0, frame.inliers / static_cast<double>(settings_.tracker.trusted_inliers));
     count_predictions(frame);
     remember(frame);
+  } else if (was_known && predict_hidden(frame, hint)) {
+    state_ = TrackingState::kPredicted;
   } else {
     ++frames_lost_;
     state_ = frames_lost_ <= settings_.tracker.recently_lost_frames ? TrackingState::kRecentlyLost
@@ -96,6 +108,7 @@ TrackedFrame Tracker::initialise(TrackedFrame frame) {
   const auto known = std::count_if(depths.begin(), depths.end(), [](float d) { return d > 0.0F; });
   if (known >= settings_.tracker.min_initial_points) {
     frame.T_camera_world = first_T_camera_world();
+    frame.trust = 1.0;
     state_ = TrackingState::kTracking;
     last_ = frame;
   }
@@ -104,7 +117,8 @@ TrackedFrame Tracker::initialise(TrackedFrame frame) {
 }
 
 std::optional<SE3> Tracker::predicted_pose(double timestamp) const {
-  if (state_ != TrackingState::kTracking || map_.keyframe_count() == 0) return std::nullopt;
+  const bool is_known = state_ == TrackingState::kTracking || state_ == TrackingState::kPredicted;
+  if (!is_known || map_.keyframe_count() == 0) return std::nullopt;
   return predict_pose(timestamp);
 }
 
@@ -125,7 +139,14 @@ SE3 Tracker::last_pose() const {
 
 SE3 Tracker::predict_pose(double timestamp) const {
   const SE3 last = last_pose();
-  return velocity_ ? SE3::exp(*velocity_ * (timestamp - last_.timestamp)) * last : last;
+  if (!velocity_) return last;
+  // Over more than some frames no motion goes on as it was.
+  constexpr double kSteady = 0.1;  // seconds
+  constexpr double kFades = 0.4;   // seconds in which it does
+  const double elapsed = timestamp - last_.timestamp;
+  const double rest = std::max(elapsed - kSteady, 0.0);
+  const double flown = std::min(elapsed, kSteady) + kFades * (1.0 - std::exp(-rest / kFades));
+  return SE3::exp(*velocity_ * flown) * last;
 }
 
 bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor) {
@@ -174,6 +195,13 @@ bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float 
   times_.match_frame += watch.seconds();
   frame.T_camera_world = predicted;
   const bool good = first_estimate(frame, positions, points);
+  passing_points_.clear();
+  passing_positions_.clear();
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (frame.landmarks[points[k]] != kTemporary) continue;
+    passing_points_.push_back(points[k]);
+    passing_positions_.push_back(positions[k]);
+  }
   std::replace(frame.landmarks.begin(), frame.landmarks.end(), kTemporary, LandmarkId{});
   return good;
 }
@@ -264,7 +292,28 @@ bool Tracker::refine_with_local_map(TrackedFrame& frame) {
     positions.push_back(map_.find(frame.landmarks[i])->position);
     points.push_back(i);
   }
-  return estimate(frame, positions, points, settings_.tracker.min_inliers);
+  if (static_cast<int>(points.size()) < settings_.tracker.scarce_inliers) {
+    for (std::size_t k = 0; k < passing_points_.size(); ++k) {
+      if (frame.landmarks[passing_points_[k]].is_valid()) continue;
+      frame.landmarks[passing_points_[k]] = kTemporary;
+      positions.push_back(passing_positions_[k]);
+      points.push_back(passing_points_[k]);
+    }
+  }
+  const bool good = estimate(frame, positions, points, settings_.tracker.min_inliers);
+  std::replace(frame.landmarks.begin(), frame.landmarks.end(), kTemporary, LandmarkId{});
+  return good;
+}
+
+// Where what moves hides the scene, the camera is taken to go on as it did, for a while.
+bool Tracker::predict_hidden(TrackedFrame& frame, const FrameHint& hint) {
+  const bool is_hidden = hint.hidden_share >= settings_.tracker.hidden_share;
+  if (!is_hidden || frame.timestamp - last_.timestamp > settings_.tracker.max_predicted) return false;
+  frame.T_camera_world = predict_pose(frame.timestamp);
+  frame.reference = last_.reference;
+  frame.inliers = 0;
+  frame.landmarks.assign(frame.view->size(), {});
+  return true;
 }
 
 bool Tracker::relocalise(TrackedFrame& frame) {

@@ -21,6 +21,7 @@ namespace roslam {
 enum class TrackingState {
   kInitialising,  ///< no map yet: waiting for a picture with enough points of known depth
   kTracking,      ///< the pose is known
+  kPredicted,     ///< what moves hides the scene; the pose is what the motion until then suggests
   kRecentlyLost,  ///< the pose was known a moment ago; searching near the last keyframes
   kLost           ///< searching among all keyframes
 };
@@ -32,10 +33,20 @@ struct TrackerOptions {
   int min_inliers = 20;         ///< landmarks a pose must rest on
   int min_frame_matches = 15;   ///< matches with the last frame that a first estimate must rest on
   double min_agreement = 0.5;   ///< share of those matches that must agree on it, else matching was by chance
+  int trusted_inliers = 60;     ///< landmarks from which on a pose is trusted fully
+  int scarce_inliers = 50;      ///< landmarks below which the last frame's points help with the pose, too
+  double hidden_share = 0.5;    ///< of the picture that must be hidden for a pose to be predicted where tracking fails
+  double max_predicted = 1.5;   ///< seconds for which it may be
   int recently_lost_frames = 30;  ///< frames after which recently lost becomes lost
 
   /// Throws OptionsError naming the field.
   void validate() const;
+};
+
+/// What is known of a frame before it is tracked.
+struct FrameHint {
+  std::optional<SE3> T_camera_world;  ///< a better guess than predicted_pose(), if there is one
+  double hidden_share = 0.0;          ///< of the picture, hidden by what moves
 };
 
 /// What tracking found out about a frame.
@@ -43,9 +54,10 @@ struct TrackedFrame {
   TrackingState state = TrackingState::kInitialising;
   double timestamp = 0.0;  ///< seconds
   std::shared_ptr<const ObservedFrame> view;
-  std::optional<SE3> T_camera_world;  ///< empty unless state is kTracking
+  std::optional<SE3> T_camera_world;  ///< empty unless state is kTracking or kPredicted
   std::vector<LandmarkId> landmarks;  ///< landmark each point shows, or none; inliers only
   int inliers = 0;                    ///< landmarks the pose rests on
+  double trust = 0.0;                 ///< 0 (predicted or unknown) to 1 (on trusted_inliers or more landmarks)
   int hidden = 0;                     ///< landmarks of the reference that lie behind what was removed
   KeyframeId reference;               ///< keyframe that shares most landmarks; none before the first keyframe
 };
@@ -66,9 +78,9 @@ class Tracker {
 
   Tracker(const Camera& camera, Map& map, const Settings& settings);
 
-  /// Frames must come in the order of time. T_camera_world: a better guess than predicted_pose().
+  /// Frames must come in the order of time.
   TrackedFrame track(std::shared_ptr<const ObservedFrame> view, double timestamp,
-                     const std::optional<SE3>& T_camera_world = {});
+                     const FrameHint& hint = {});
 
   /// T_camera_world at that time as the motion so far suggests it; nothing unless the pose was known a moment
   /// ago.
@@ -78,6 +90,9 @@ class Tracker {
   void promoted(KeyframeId keyframe);
 
   TrackingState state() const { return state_; }
+
+  /// The landmarks around the last frame, some of which may be gone by now.
+  const std::vector<LandmarkId>& local_landmarks() const { return local_map_.landmarks(); }
 
   /// Seconds the last call spent in each step, for the report.
   struct Times {
@@ -94,6 +109,7 @@ class Tracker {
   bool match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor);
   bool match_reference(TrackedFrame& frame);
   bool refine_with_local_map(TrackedFrame& frame);
+  bool predict_hidden(TrackedFrame& frame, const FrameHint& hint);
   bool relocalise(TrackedFrame& frame);
   bool estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
                 const std::vector<std::uint32_t>& points, int min_inliers);
@@ -116,6 +132,9 @@ class Tracker {
   TrackedFrame last_;                 // the last frame with a pose
   SE3 T_last_reference_;              // its pose in its reference keyframe, which bundle adjustment may move
   std::optional<Vector6d> velocity_;  // twist of T_current_last, per second; none: unknown
+  // Points of the frame in work that show what the last frame saw and the map does not know.
+  std::vector<std::uint32_t> passing_points_;
+  std::vector<Eigen::Vector3d> passing_positions_;  // world, metres
   int frames_lost_ = 0;
   Times times_;
 };
