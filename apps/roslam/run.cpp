@@ -12,6 +12,7 @@
 #include "apps/roslam/progress.hpp"
 #include "apps/roslam/sources.hpp"
 #include "roslam/error.hpp"
+#include "roslam/pipeline/removal_log.hpp"
 #include "roslam/pipeline/run.hpp"
 #include "roslam/pipeline/run_folder.hpp"
 #include "roslam/pipeline/slam.hpp"
@@ -29,6 +30,7 @@ struct RunArguments {
   std::string model;    // weights in place of the shipped ones
   std::string dynamic;  // empty: as the options say
   bool print_config = false;
+  bool video = false;
   bool quiet = false;
   bool json = false;
 };
@@ -76,6 +78,16 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
       "tracked %zu of %zu frames (%.1f %%), %zu dropped%s\n", tracked, slam.frames(),
       100.0 * static_cast<double>(tracked) / static_cast<double>(std::max<std::size_t>(slam.frames(), 1)),
       summary.dropped, summary.interrupted ? ", interrupted" : "");
+  if (summary.removal && summary.removal->frames > 0) {
+    const RemovalTally& tally = *summary.removal;
+    std::printf("removed: %.1f %% of the picture on average",
+                100.0 * tally.removed_area / static_cast<double>(tally.frames));
+    if (tally.predicted > 0) std::printf("; %zu frames predicted while it was hidden", tally.predicted);
+    std::printf("\n");
+  }
+  for (const auto& [fault, count] : slam.labelling_faults()) {
+    std::fprintf(stderr, "note: %s (%zu times)\n", fault.c_str(), count);
+  }
   std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
               slam.map().landmark_count());
   if (const auto found = times.find("tracking"); found != times.end()) {
@@ -105,15 +117,31 @@ void execute(const RunArguments& arguments, const std::string& version) {
   const auto segmenter = open_segmenter(arguments, options, description.segmentation_model);
   Slam slam(source->camera(), options, arguments.real_time ? Mode::kRealTime : Mode::kDeterministic,
             segmenter);
+  std::optional<RemovalLog> log;
+  RemovalLog::remove_old(folder.path());
+  if (options.removal.is_on()) {
+    log.emplace(RemovalLog::Settings{folder.path(), slam.mode(), source->camera().fps, arguments.video});
+  }
   RunSummary summary;
   {
     Progress progress(source->size(), arguments.quiet || arguments.json);
     summary = run(
         *source, slam,
-        [&](const Frame&, const FrameResult& frame) { progress.show(frame.index + 1, name_of(frame.state)); },
+        [&](const Frame& frame, const FrameResult& result) {
+          if (log) log->add(frame, result);
+          progress.show(result.index + 1, name_of(result.state));
+        },
         interrupt.token());
   }
+  std::exception_ptr log_failure;
+  try {
+    if (log) log->finish();
+  } catch (...) {
+    log_failure = std::current_exception();
+  }
+  if (log) summary.removal = log->tally();
   folder.write(slam, summary, *source, description);
+  if (log_failure) std::rethrow_exception(log_failure);
   if (summary.failure) std::rethrow_exception(summary.failure);
   require_poses(slam, summary, *source, arguments.source.name);
   if (arguments.json) {
@@ -172,6 +200,8 @@ void add_run_command(CLI::App& program, const std::string& version) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("--print-config", arguments->print_config, "Print the effective options and stop");
+  command->add_flag("--video", arguments->video,
+                    "Write removal.avi too: each frame with what was kept and what was removed");
   command->add_flag("--quiet", arguments->quiet, "No progress");
   command->add_flag("--json", arguments->json, "Print the report as one JSON object");
   command->callback([arguments, version] { execute(*arguments, version); });

@@ -4,8 +4,10 @@
 #include <cstddef>
 #include <exception>
 #include <functional>
+#include <optional>
 #include <stop_token>
 
+#include "roslam/pipeline/removal_record.hpp"
 #include "roslam/pipeline/slam.hpp"
 #include "roslam/sources/frame_source.hpp"
 
@@ -19,7 +21,8 @@ struct RunSummary {
   double wall_seconds = 0.0;         ///< from the first read to the last result
   double first_pose_seconds = -1.0;  ///< from the first read to the first pose; negative = no pose
   double start_up_seconds = -1.0;  ///< from the start of the process to the first pose; negative = not known
-  Trajectory truth;                ///< true poses of the frames, where the source knows them
+  std::optional<RemovalTally> removal;  ///< what was removed, where a RemovalLog was kept
+  Trajectory truth;                     ///< true poses of the frames, where the source knows them
 };
 
 /// Feeds a source through the pipeline until it ends or a stop is requested; the frame in work is finished

@@ -15,7 +15,8 @@ struct RunDescription {
   std::string source;   ///< as the user named it
   std::string camera;   ///< as the user named it
   std::string version;  ///< of the program
-  std::string segmentation_model;  ///< file of the network that labelled the frames; empty: nothing was removed
+  std::string
+      segmentation_model;  ///< file of the network that labelled the frames; empty: nothing was removed
 };
 
 /// Where the results of a run go:

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <map>
@@ -83,6 +84,31 @@ Json times_json(const StageTimes& times) {
   return json;
 }
 
+// Shares are of all points or pixels of the run, ages in frames.
+Json dynamic_json(const Slam& slam, const RunSummary& summary, const RunDescription& description) {
+  Json json{{"mode", mode_of(slam.options().removal)},
+            {"model", description.segmentation_model},
+            {"labelling_faults", counts_json(slam.labelling_faults())}};
+  if (!summary.removal) return json;
+  const RemovalTally& tally = *summary.removal;
+  const auto frames = static_cast<double>(std::max<std::size_t>(tally.frames, 1));
+  std::size_t removed = 0;
+  for (const auto& [kind, count] : tally.removed_points) removed += count;
+  const auto points = static_cast<double>(std::max<std::size_t>(tally.kept_points + removed, 1));
+  std::vector<int> ages = tally.label_ages;
+  std::sort(ages.begin(), ages.end());
+  json["removed_area_share"] = rounded(tally.removed_area / frames, 4);
+  json["removed_point_share"] = rounded(static_cast<double>(removed) / points, 4);
+  json["removed_points"] = counts_json(tally.removed_points);
+  json["frames_with_labels"] = ages.size();
+  json["label_age_median"] = ages.empty() ? Json(nullptr) : Json(ages[ages.size() / 2]);
+  json["label_age_max"] = ages.empty() ? Json(nullptr) : Json(ages.back());
+  json["low_trust_frames"] = tally.low_trust;
+  json["predicted_frames"] = tally.predicted;
+  json["masks_dropped"] = tally.masks_dropped;
+  return json;
+}
+
 double path_length(const Trajectory& trajectory) {
   double length = 0.0;
   for (std::size_t i = 1; i < trajectory.size(); ++i) {
@@ -104,9 +130,7 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   json["interrupted"] = summary.interrupted;
   json["error"] = failure_json(summary.failure);
   json["frames"] = frames_json(slam, summary, source);
-  json["dynamic"] = {{"mode", mode_of(slam.options().removal)},
-                     {"model", description.segmentation_model},
-                     {"labelling_faults", counts_json(slam.labelling_faults())}};
+  json["dynamic"] = dynamic_json(slam, summary, description);
   json["keyframes"] = slam.map().keyframe_count();
   json["landmarks"] = slam.map().landmark_count();
   json["path_length_metres"] = rounded(path_length(slam.trajectory()), 3);

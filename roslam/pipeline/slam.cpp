@@ -82,7 +82,8 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
   if (tracked.T_camera_world) result.T_world_camera = tracked.T_camera_world->inverse();
   if (removes()) {
     const bool is_measured = tracked.state == TrackingState::kTracking;
-    removal_.remember(is_measured ? tracked.T_camera_world : std::nullopt, result.points, result.removed_points);
+    removal_.remember(is_measured ? tracked.T_camera_world : std::nullopt, result.points,
+                      result.removed_points);
   }
   return result;
 }

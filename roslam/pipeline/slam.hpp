@@ -31,7 +31,7 @@ struct FrameResult {
   TrackingState state = TrackingState::kInitialising;
   std::optional<SE3> T_world_camera;  ///< as known now; later corrections show in Slam::trajectory()
   int inliers = 0;                    ///< landmarks the pose rests on
-  double trust = 0.0;  ///< in the pose, 0 (predicted or unknown) to 1
+  double trust = 0.0;                 ///< in the pose, 0 (predicted or unknown) to 1
   bool is_keyframe = false;
   double tracking_seconds = 0.0;            ///< processor time of the tracking thread
   Removal removal;                          ///< what was found to move

@@ -103,13 +103,13 @@ DynamicRemoval::Scene DynamicRemoval::gather_evidence() const {
   return scene;
 }
 
-// Depth holds for moving what a pose that went astray, or a bad reading, sets apart; points that were followed over it
-// and are at rest show that it is not.
+// Depth holds for moving what a pose that went astray, or a bad reading, sets apart; points that were
+// followed over it and are at rest show that it is not.
 void DynamicRemoval::drop_contradicted(FreeSpaceEvidence& space, const FollowedPoints& flow) const {
   cv::Mat numbers;
   const int count = cv::connectedComponents(cells_that_are(Evidence::kMoving, space), numbers, 8, CV_32S);
-  const auto evidence = evidence_by_owner(numbers, static_cast<std::size_t>(count), space, flow, grid_,
-                                          settings_.removal);
+  const auto evidence =
+      evidence_by_owner(numbers, static_cast<std::size_t>(count), space, flow, grid_, settings_.removal);
   for (int n = 1; n < count; ++n) {
     if (!contradicts_motion(evidence[static_cast<std::size_t>(n)])) continue;
     space.state.setTo(static_cast<int>(Evidence::kUnknown), numbers == n);

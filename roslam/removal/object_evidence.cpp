@@ -39,7 +39,8 @@ std::vector<ObjectEvidence> evidence_by_owner(const cv::Mat& owners, std::size_t
 bool rests(const ObjectEvidence& e, const RemovalOptions& options) {
   constexpr double kAtRest = 0.9;  // of what is known
   constexpr double kMoving = 0.05;
-  const bool flow_agrees = !options.flow || !e.is_flow_fine || e.flow_moving <= kMoving * (e.flow_moving + e.flow_at_rest);
+  const bool flow_agrees =
+      !options.flow || !e.is_flow_fine || e.flow_moving <= kMoving * (e.flow_moving + e.flow_at_rest);
   return e.cells > 0 && e.known >= kMostlyKnown * e.cells && e.at_rest_long >= kAtRest * e.known &&
          e.moving <= kMoving * e.known && flow_agrees;
 }
@@ -48,7 +49,8 @@ bool seems_at_rest(const ObjectEvidence& e, const RemovalOptions& options) {
   constexpr int kEnough = 5;  // points
   constexpr double kFewMoving = 0.1;
   const int followed = e.flow_moving + e.flow_at_rest;
-  const bool flow_agrees = e.is_flow_fine && e.flow_at_rest >= kEnough && e.flow_moving <= kFewMoving * followed;
+  const bool flow_agrees =
+      e.is_flow_fine && e.flow_at_rest >= kEnough && e.flow_moving <= kFewMoving * followed;
   constexpr double kAtRest = 0.8;  // of what is known
   constexpr double kMoving = 0.05;
   const bool depth_agrees = e.cells > 0 && e.known >= kMostlyKnown * e.cells &&

@@ -21,7 +21,8 @@ struct ObjectEvidence {
   int at_rest_long = 0;     ///< cells with the same surface as RemovalOptions::rest ago
   int flow_moving = 0;      ///< followed points that move
   int flow_at_rest = 0;     ///< followed points that do not
-  bool is_flow_fine = true;  ///< false: points at rest are off by so much that slow things would pass for resting
+  bool is_flow_fine =
+      true;  ///< false: points at rest are off by so much that slow things would pass for resting
 };
 
 /// Counts for each number in owners (CV_32SC1 of cells, 0 = none); the result has count + 1 entries, of which

@@ -48,7 +48,8 @@ void TrackerOptions::validate() const {
     throw OptionsError("tracker.min_agreement must be 0 to 1");
   if (trusted_inliers < 1) throw OptionsError("tracker.trusted_inliers must be at least 1");
   if (scarce_inliers < 0) throw OptionsError("tracker.scarce_inliers must not be negative");
-  if (!(hidden_share >= 0.0 && hidden_share <= 1.0)) throw OptionsError("tracker.hidden_share must be 0 to 1");
+  if (!(hidden_share >= 0.0 && hidden_share <= 1.0))
+    throw OptionsError("tracker.hidden_share must be 0 to 1");
   if (!(max_predicted >= 0.0 && max_predicted <= 60.0))
     throw OptionsError("tracker.max_predicted must be 0 to 60 seconds");
   if (recently_lost_frames < 0) throw OptionsError("tracker.recently_lost_frames must not be negative");

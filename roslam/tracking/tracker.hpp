@@ -35,8 +35,9 @@ struct TrackerOptions {
   double min_agreement = 0.5;   ///< share of those matches that must agree on it, else matching was by chance
   int trusted_inliers = 60;     ///< landmarks from which on a pose is trusted fully
   int scarce_inliers = 50;      ///< landmarks below which the last frame's points help with the pose, too
-  double hidden_share = 0.5;    ///< of the picture that must be hidden for a pose to be predicted where tracking fails
-  double max_predicted = 1.5;   ///< seconds for which it may be
+  double hidden_share =
+      0.5;  ///< of the picture that must be hidden for a pose to be predicted where tracking fails
+  double max_predicted = 1.5;     ///< seconds for which it may be
   int recently_lost_frames = 30;  ///< frames after which recently lost becomes lost
 
   /// Throws OptionsError naming the field.
@@ -57,9 +58,9 @@ struct TrackedFrame {
   std::optional<SE3> T_camera_world;  ///< empty unless state is kTracking or kPredicted
   std::vector<LandmarkId> landmarks;  ///< landmark each point shows, or none; inliers only
   int inliers = 0;                    ///< landmarks the pose rests on
-  double trust = 0.0;                 ///< 0 (predicted or unknown) to 1 (on trusted_inliers or more landmarks)
-  int hidden = 0;                     ///< landmarks of the reference that lie behind what was removed
-  KeyframeId reference;               ///< keyframe that shares most landmarks; none before the first keyframe
+  double trust = 0.0;    ///< 0 (predicted or unknown) to 1 (on trusted_inliers or more landmarks)
+  int hidden = 0;        ///< landmarks of the reference that lie behind what was removed
+  KeyframeId reference;  ///< keyframe that shares most landmarks; none before the first keyframe
 };
 
 /// Estimates the pose of each frame against the map: predicts it from the motion so far, matches with the
@@ -79,8 +80,7 @@ class Tracker {
   Tracker(const Camera& camera, Map& map, const Settings& settings);
 
   /// Frames must come in the order of time.
-  TrackedFrame track(std::shared_ptr<const ObservedFrame> view, double timestamp,
-                     const FrameHint& hint = {});
+  TrackedFrame track(std::shared_ptr<const ObservedFrame> view, double timestamp, const FrameHint& hint = {});
 
   /// T_camera_world at that time as the motion so far suggests it; nothing unless the pose was known a moment
   /// ago.
