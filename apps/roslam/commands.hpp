@@ -9,6 +9,7 @@ namespace roslam::app {
 // Each adds one subcommand to the program; its callback does the work and throws roslam::Error on bad input.
 void add_run_command(CLI::App& program, const std::string& version);
 void add_simulate_command(CLI::App& program);
+void add_compose_command(CLI::App& program);
 void add_segment_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
 void add_benchmark_command(CLI::App& program, const std::string& version);

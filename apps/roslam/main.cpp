@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
   program.set_version_flag("--version", ROSLAM_VERSION);
   roslam::app::add_run_command(program, ROSLAM_VERSION);
   roslam::app::add_simulate_command(program);
+  roslam::app::add_compose_command(program);
   roslam::app::add_segment_command(program);
   roslam::app::add_evaluate_command(program);
   roslam::app::add_benchmark_command(program, ROSLAM_VERSION);

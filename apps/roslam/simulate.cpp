@@ -2,17 +2,15 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "apps/roslam/commands.hpp"
 #include "apps/roslam/output.hpp"
 #include "apps/roslam/progress.hpp"
-#include "roslam/error.hpp"
+#include "apps/roslam/tum_writer.hpp"
 #include "roslam/sources/simulated_source.hpp"
 #include "roslam/write_file.hpp"
 
@@ -49,34 +47,6 @@ Writes to the folder, images named after their time in seconds:
   instances/              which moving thing each pixel shows, 16 bit, 0 = none
   background/rgb, depth   the same views without anything that can move, parked cars included)";
 
-std::string stamp(double timestamp) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.6f", timestamp);
-  return text;
-}
-
-/// A text file that is written line by line and checked at its end.
-class TextFile {
- public:
-  explicit TextFile(fs::path file) : file_(std::move(file)), stream_(file_) { check(); }
-  void line(const std::string& text) {
-    stream_ << text << "\n";
-    check();
-  }
-  void close() {
-    stream_.close();
-    check();
-  }
-
- private:
-  void check() const {
-    if (!stream_)
-      throw OutputError("cannot write " + file_.string() + ": is the folder writable and the disk not full?");
-  }
-  fs::path file_;
-  std::ofstream stream_;
-};
-
 std::string pose_line(double timestamp, const SE3& pose) {
   const auto& t = pose.translation();
   const auto& q = pose.rotation();
@@ -86,22 +56,15 @@ std::string pose_line(double timestamp, const SE3& pose) {
   return text;
 }
 
-cv::Mat packed(const cv::Mat& depth, const Camera& camera) {
-  cv::Mat image;
-  depth.convertTo(image, CV_16U,
-                  camera.depth_units_per_metre);  // what does not fit becomes the largest value
-  image.setTo(0, depth * camera.depth_units_per_metre > 65535.0);
-  return image;
-}
-
 void write_images(const fs::path& out, const std::string& name, const SimulatedView& view,
                   const Camera& camera) {
   write_picture(out / "rgb" / name, view.frame.colour);
-  write_picture(out / "depth" / name, packed(view.frame.depth, camera));
+  write_picture(out / "depth" / name, packed_depth(view.frame.depth, camera.depth_units_per_metre));
   write_picture(out / "labels" / name, view.frame.labels);
   write_picture(out / "instances" / name, view.instances);
   write_picture(out / "background" / "rgb" / name, view.background_colour);
-  write_picture(out / "background" / "depth" / name, packed(view.background_depth, camera));
+  write_picture(out / "background" / "depth" / name,
+                packed_depth(view.background_depth, camera.depth_units_per_metre));
 }
 
 void simulate(const SimulateArguments& arguments) {
@@ -116,9 +79,7 @@ void simulate(const SimulateArguments& arguments) {
   }
   const auto start = Clock::now();
   Simulator simulator(options);
-  TextFile camera(arguments.out / "camera.yaml");
-  camera.line(camera_to_yaml(simulator.camera()));
-  camera.close();
+  write_file(arguments.out / "camera.yaml", camera_to_yaml(simulator.camera()));
   TextFile colours(arguments.out / "rgb.txt");
   TextFile depths(arguments.out / "depth.txt");
   TextFile poses(arguments.out / "groundtruth.txt");

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <tuple>
 
 #include "roslam/error.hpp"
@@ -65,26 +64,11 @@ std::vector<PosePair> nearest_pairs(const Trajectory& truth, const Trajectory& e
   return pairs;
 }
 
-std::optional<StampedPose> interpolated(const Trajectory& truth, double time, double max_gap) {
-  const auto after = first_not_before(truth, time);
-  if (after == truth.end()) return std::nullopt;
-  if (after->timestamp == time) return *after;
-  if (after == truth.begin()) return std::nullopt;
-  const auto before = std::prev(after);
-  const double gap = after->timestamp - before->timestamp;
-  if (gap > max_gap) return std::nullopt;
-  const double share = (time - before->timestamp) / gap;
-  const SE3& a = before->T_world_camera;
-  const SE3& b = after->T_world_camera;
-  return StampedPose{time, SE3(a.rotation().slerp(share, b.rotation()),
-                               (1.0 - share) * a.translation() + share * b.translation())};
-}
-
 std::vector<PosePair> interpolated_pairs(const Trajectory& truth, const Trajectory& estimate,
                                          double max_gap) {
   std::vector<PosePair> pairs;
   for (const auto& pose : estimate) {
-    if (const auto matched = interpolated(truth, pose.timestamp, max_gap)) pairs.push_back({*matched, pose});
+    if (const auto matched = pose_at(truth, pose.timestamp, max_gap)) pairs.push_back({*matched, pose});
   }
   return pairs;
 }

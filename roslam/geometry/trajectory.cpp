@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <string>
@@ -93,6 +94,22 @@ Eigen::Vector4d canonical_coefficients(const Eigen::Quaterniond& q) {
   return xyzw;
 }
 }  // namespace
+
+std::optional<StampedPose> pose_at(const Trajectory& trajectory, double time, double max_gap) {
+  const auto after = std::lower_bound(trajectory.begin(), trajectory.end(), time,
+                                      [](const StampedPose& pose, double t) { return pose.timestamp < t; });
+  if (after == trajectory.end()) return std::nullopt;
+  if (after->timestamp == time) return *after;
+  if (after == trajectory.begin()) return std::nullopt;
+  const auto before = std::prev(after);
+  const double gap = after->timestamp - before->timestamp;
+  if (gap > max_gap) return std::nullopt;
+  const double share = (time - before->timestamp) / gap;
+  const SE3& a = before->T_world_camera;
+  const SE3& b = after->T_world_camera;
+  return StampedPose{time, SE3(a.rotation().slerp(share, b.rotation()),
+                               (1.0 - share) * a.translation() + share * b.translation())};
+}
 
 TrajectoryFile read_trajectory(const std::filesystem::path& file) {
   std::ifstream in(file);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "roslam/geometry/se3.hpp"
@@ -16,6 +17,10 @@ struct StampedPose {
 
 /// Poses in the order of time.
 using Trajectory = std::vector<StampedPose>;
+
+/// The pose at a time, interpolated between the poses before and after it; nothing outside the trajectory and
+/// where those two are more than max_gap seconds apart.
+std::optional<StampedPose> pose_at(const Trajectory& trajectory, double time, double max_gap);
 
 /// What read_trajectory found.
 struct TrajectoryFile {

@@ -145,6 +145,11 @@ std::vector<int> associate(const std::vector<TimedFile>& colour, const std::vect
   return result;
 }
 
+std::optional<std::filesystem::path> TumSource::depth_file(std::size_t index) const {
+  if (depth_of_colour_[index] < 0) return std::nullopt;
+  return folder_ / depth_[static_cast<std::size_t>(depth_of_colour_[index])].file;
+}
+
 bool TumSource::recognises(const std::filesystem::path& folder) {
   return std::filesystem::exists(folder / "rgb.txt");
 }

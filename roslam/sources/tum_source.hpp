@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,8 +24,8 @@ struct TimedFile {
   std::filesystem::path file;  ///< relative to the dataset folder
 };
 
-/// The files that an rgb.txt or depth.txt names, as listed; lines whose time is no number are left out. Throws
-/// InputError if the file is missing, malformed or names no image.
+/// The files that an rgb.txt or depth.txt names, as listed; lines whose time is no number are left out.
+/// Throws InputError if the file is missing, malformed or names no image.
 std::vector<TimedFile> read_tum_list(const std::filesystem::path& file);
 
 /// Pairs each colour image with the depth image nearest in time; each depth image serves once. The result
@@ -47,6 +48,12 @@ class TumSource : public FrameSource {
   std::optional<std::size_t> size() const override { return size_; }
   std::map<std::string, std::size_t> skipped() const override { return skipped_; }
   std::map<std::string, std::size_t> skipped_depth() const override { return skipped_depth_; }
+
+  /// The file that a frame's colour came from. index: of a frame that next() gave.
+  std::filesystem::path colour_file(std::size_t index) const { return folder_ / colour_[index].file; }
+
+  /// The depth image paired with it, if there is one; it may not be readable.
+  std::optional<std::filesystem::path> depth_file(std::size_t index) const;
 
   /// True if the folder looks like a TUM dataset.
   static bool recognises(const std::filesystem::path& folder);

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+namespace roslam::app {
+
+/// A time in seconds as lists and file names of the TUM format give it: six decimals.
+std::string stamp(double timestamp);
+
+/// Depth in metres (CV_32FC1, 0 = unknown) as a 16-bit image. What does not fit becomes unknown.
+cv::Mat packed_depth(const cv::Mat& depth, double units_per_metre);
+
+/// A text file that is written line by line and checked at each. Everything throws OutputError when the file
+/// cannot be written.
+class TextFile {
+ public:
+  explicit TextFile(std::filesystem::path file);
+  void line(const std::string& text);
+
+  /// Writes what is still held back.
+  void close();
+
+ private:
+  void check() const;
+
+  std::filesystem::path file_;
+  std::ofstream stream_;
+};
+
+}  // namespace roslam::app
