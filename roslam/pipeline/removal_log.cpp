@@ -18,6 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kQueue = 30;         // frames that may wait to be written
 constexpr std::size_t kStripPictures = 8;  // of which twice as many are kept until the end
+constexpr const char* kFullDisk = ": cannot be written in full; check the free space on the disk";
 constexpr const char* kLines = "descriptors.jsonl";
 constexpr const char* kMasks = "masks";
 constexpr const char* kStrip = "removal.jpg";
@@ -117,8 +118,7 @@ void RemovalLog::write(const Entry& entry) {
   }
   lines_ << descriptor_line(result, entry.picture, mask) << "\n";
   if (!lines_) {
-    throw OutputError((settings_.folder / kLines).string() +
-                      ": cannot be written in full; check the free space on the disk");
+    throw OutputError((settings_.folder / kLines).string() + kFullDisk);
   }
   if (!entry.colour.empty()) write_picture(entry);
 }
@@ -151,13 +151,16 @@ void RemovalLog::finish() {
     changed_.notify_all();
   }
   if (thread_.joinable()) thread_.join();
-  if (failure_) std::rethrow_exception(failure_);
-  lines_.flush();
-  if (!lines_) {
-    throw OutputError((settings_.folder / kLines).string() +
-                      ": cannot be written in full; check the free space on the disk");
-  }
+  lines_.close();
   video_.release();
+  if (!failure_ && !lines_) {
+    failure_ = std::make_exception_ptr(OutputError((settings_.folder / kLines).string() + kFullDisk));
+  }
+  if (failure_) {
+    // On a full disk the trajectory needs the room more.
+    remove_old(settings_.folder);
+    std::rethrow_exception(failure_);
+  }
   if (strip_.empty()) return;
   std::vector<cv::Mat> pictures;
   const std::size_t count = std::min(strip_.size(), kStripPictures);

@@ -62,7 +62,7 @@ Removal DynamicRemoval::find(const Frame& frame, const cv::Mat& grey,
   }
   claim(scene, before);
   weigh(scene);
-  if (options.free_space) {
+  if (options.free_space && !history_.empty()) {
     const cv::Mat barrier = cells_that_are(Evidence::kStatic, scene.space);
     grow(scene.owners, {depth_cells_, barrier, scene.seeds, scene.moving}, grid_, options.growth);
   }
@@ -210,9 +210,11 @@ void DynamicRemoval::weigh(Scene& scene) {
     const bool is_sure =
         object.kind != Movable::kUnknown && static_cast<double>(object.sureness) >= options.sure;
     object.is_at_rest = is_sure && rests(evidence[i + 1], options);
-    object.is_believed = object.kind == Movable::kUnknown
-                             ? !contradicts_motion(evidence[i + 1])
-                             : is_sure || !seems_at_rest(evidence[i + 1], options);
+    constexpr int kConfirmed = 3;  // labels that an uncertain thing must be seen in: noise comes and goes
+    object.is_believed =
+        object.kind == Movable::kUnknown
+            ? !contradicts_motion(evidence[i + 1])
+            : is_sure || (object.sightings >= kConfirmed && !seems_at_rest(evidence[i + 1], options));
     if (!object.is_believed) scene.owners.setTo(0, scene.owners == number);
   }
 }

@@ -19,7 +19,7 @@ struct RemovalOptions {
   int label_every = 1;              ///< frames; in deterministic mode every n-th is labelled
   double max_labelled_share = 0.9;  ///< of the picture; a network that labels more as movable is not believed
   double min_object_share = 0.0005;  ///< of the picture; smaller things are not told apart from noise
-  double sure = 0.65;                ///< mean probability from which a label is believed against quick doubts
+  double sure = 0.5;                 ///< mean probability from which a label is believed against quick doubts
   double keep_missed = 0.5;          ///< seconds that a thing is kept which newer labels miss
 
   // Geometry.
