@@ -149,6 +149,7 @@ std::shared_ptr<const ObservedFrame> Slam::extract(const Frame& frame, const cv:
 std::map<std::string, std::size_t> Slam::labelling_faults() const {
   auto faults = segmentation_.faults();
   for (const auto& [reason, count] : removal_.faults()) faults[reason] += count;
+  if (removal_.flickers() > 0) faults["labels come and go"] += removal_.flickers();
   return faults;
 }
 

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A segmenter that misbehaves costs labels, not the flight; what went wrong is counted under one name.
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "roslam/error.hpp"
+#include "roslam/pipeline/run.hpp"
+#include "roslam/semantics/segmenter.hpp"
+#include "tests/street.hpp"
+
+namespace roslam::street {
+namespace {
+
+constexpr int kPerson = 11;
+
+class Scripted : public Segmenter {
+ public:
+  using Script = std::function<cv::Mat(const cv::Mat& image, int call)>;
+  explicit Scripted(Script script) : script_(std::move(script)) {}
+  Segmentation segment(const cv::Mat& image) override {
+    Segmentation result;
+    result.labels = script_(image, calls_++);
+    result.confidence.fill(0.9F);
+    return result;
+  }
+
+ private:
+  Script script_;
+  int calls_ = 0;
+};
+
+cv::Mat nothing(const cv::Mat& image) { return cv::Mat::zeros(image.size(), CV_8UC1); }
+
+class SegmenterFaults : public testing::TestWithParam<Mode> {
+ protected:
+  // Runs the street and expects it to be tracked nearly whole, with the one fault.
+  void expect_survived(const std::shared_ptr<Segmenter>& segmenter, const std::string& fault,
+                       double timeout = 10.0) {
+    TumSource source(kFolder, *camera_preset("simulated"));
+    Options options;
+    options.threads.segmentation_timeout = timeout;
+    Slam slam(source.camera(), options, GetParam(), segmenter);
+    const RunSummary summary = run(source, slam);
+    ASSERT_FALSE(summary.failure);
+    EXPECT_GT(slam.frames(), 10U);
+    EXPECT_GE(slam.trajectory().size(), slam.frames() - 1);
+    const auto faults = slam.labelling_faults();
+    std::size_t named = 0;
+    for (const auto& [reason, count] : faults) {
+      if (reason.find(fault) == std::string::npos) continue;
+      ++named;
+      EXPECT_GT(count, 0U);
+    }
+    EXPECT_EQ(named, 1U) << fault;
+  }
+};
+
+TEST_P(SegmenterFaults, ThatThrows) {
+  expect_survived(std::make_shared<Scripted>(
+                      [](const cv::Mat&, int) -> cv::Mat { throw ModelError("weights are broken"); }),
+                  "the segmenter failed: weights are broken");
+}
+
+TEST_P(SegmenterFaults, ThatGivesTheWrongSize) {
+  expect_survived(
+      std::make_shared<Scripted>([](const cv::Mat&, int) { return cv::Mat(3, 5, CV_8UC1, cv::Scalar(0)); }),
+      "another size");
+}
+
+TEST_P(SegmenterFaults, ThatGivesNothing) {
+  expect_survived(std::make_shared<Scripted>([](const cv::Mat&, int) { return cv::Mat(); }), "another size");
+}
+
+TEST_P(SegmenterFaults, ThatLabelsEverythingAsPerson) {
+  expect_survived(std::make_shared<Scripted>([](const cv::Mat& image, int) {
+                    return cv::Mat(image.size(), CV_8UC1, cv::Scalar(kPerson));
+                  }),
+                  "nearly everything is labelled as movable");
+}
+
+TEST_P(SegmenterFaults, ThatFlickers) {
+  expect_survived(std::make_shared<Scripted>([](const cv::Mat& image, int call) {
+                    cv::Mat labels = nothing(image);
+                    if (call % 2 == 0) labels(cv::Rect(40, 40, 200, 300)) = kPerson;
+                    return labels;
+                  }),
+                  "come and go");
+}
+
+TEST_P(SegmenterFaults, ThatHangs) {
+  struct Gate {
+    std::mutex mutex;
+    std::condition_variable opened;
+    bool is_open = false;
+  };
+  const auto gate = std::make_shared<Gate>();
+  expect_survived(std::make_shared<Scripted>([gate](const cv::Mat& image, int call) {
+                    if (call >= 3) {
+                      std::unique_lock lock(gate->mutex);
+                      gate->opened.wait(lock, [&] { return gate->is_open; });
+                    }
+                    return nothing(image);
+                  }),
+                  "does not answer", 0.5);
+  const std::scoped_lock lock(gate->mutex);
+  gate->is_open = true;
+  gate->opened.notify_all();
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, SegmenterFaults, testing::Values(Mode::kDeterministic, Mode::kRealTime),
+                         [](const auto& parameter) {
+                           return parameter.param == Mode::kDeterministic ? "Deterministic" : "RealTime";
+                         });
+
+}  // namespace
+}  // namespace roslam::street
