@@ -98,7 +98,6 @@ Trajectory read_truth(const fs::path& folder) {
   return truth;
 }
 
-// The output has the layout of the input: in its place it would replace it.
 std::optional<Eigen::Vector3d> find_up(const fs::path& folder, const Camera& camera,
                                        const Trajectory& truth) {
   const auto images = read_tum_list(folder / "depth.txt");
@@ -115,6 +114,7 @@ std::optional<Eigen::Vector3d> find_up(const fs::path& folder, const Camera& cam
   return estimate.up();
 }
 
+// The output has the layout of the input: in its place it would replace it.
 void protect_base(const CompositionSettings& settings) {
   std::set<fs::path> folders{settings.folder};
   for (const char* list : {"rgb.txt", "depth.txt"}) {

@@ -86,7 +86,7 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
     std::printf("\n");
   }
   for (const auto& [fault, count] : slam.labelling_faults()) {
-    std::fprintf(stderr, "note: %s (%zu times)\n", fault.c_str(), count);
+    std::printf("note: %s (%zu times)\n", fault.c_str(), count);
   }
   std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
               slam.map().landmark_count());

@@ -108,7 +108,8 @@ void RemovalLog::work() {
 
 void RemovalLog::write(const Entry& entry) {
   const FrameResult& result = entry.result;
-  tally_.add(result, entry.picture);
+  const PointCounts removed = removed_by_class(result, entry.picture);
+  tally_.add(result, entry.picture, removed);
   std::string mask;
   if (!entry.with_mask) {
     ++tally_.masks_dropped;
@@ -116,7 +117,7 @@ void RemovalLog::write(const Entry& entry) {
     mask = mask_name(result.timestamp);
     write_image(settings_.folder / mask, object_image(result.removal.objects, entry.picture));
   }
-  lines_ << descriptor_line(result, entry.picture, mask) << "\n";
+  lines_ << descriptor_line(result, entry.picture, removed, mask) << "\n";
   if (!lines_) {
     throw OutputError((settings_.folder / kLines).string() + kFullDisk);
   }

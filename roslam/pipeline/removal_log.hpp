@@ -43,8 +43,8 @@ class RemovalLog {
 
   void add(const Frame& frame, const FrameResult& result);
 
-  /// Writes the rest and the strip. Throws OutputError if anything could not be written; then nothing of the log
-  /// stays, to leave room for the results of the run.
+  /// Writes the rest and the strip. Throws OutputError if anything could not be written; then nothing of the
+  /// log stays, to leave room for the results of the run.
   void finish();
 
   /// Only after finish().

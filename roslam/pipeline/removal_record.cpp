@@ -17,20 +17,6 @@ constexpr int kLastNumber = 255;
 
 double rounded(double value, double factor) { return std::round(value * factor) / factor; }
 
-std::map<std::string, std::size_t> removed_by_class(const FrameResult& result, const cv::Size& picture) {
-  std::map<std::string, std::size_t> counts;
-  if (result.removed_points.empty()) return counts;
-  const cv::Mat kinds = removed_kinds(result.removal, picture);
-  for (const auto& point : result.removed_points) {
-    const cv::Point pixel(std::clamp(cvRound(point.x), 0, kinds.cols - 1),
-                          std::clamp(cvRound(point.y), 0, kinds.rows - 1));
-    const auto kind = static_cast<Movable>(kinds.at<std::uint8_t>(pixel));
-    // Extraction keeps some pixels off the mask, where no class is drawn.
-    ++counts[kind == Movable::kNone ? "margin" : std::string(name_of(kind))];
-  }
-  return counts;
-}
-
 double area_share(const Removal& removal, const cv::Size& picture) {
   return removal.mask.empty() ? 0.0 : cv::countNonZero(removal.mask) / static_cast<double>(picture.area());
 }
@@ -51,18 +37,30 @@ Json object_json(const MovableObject& object, int value) {
 }
 }  // namespace
 
-void RemovalTally::add(const FrameResult& result, const cv::Size& picture) {
+PointCounts removed_by_class(const FrameResult& result, const cv::Size& picture) {
+  PointCounts counts;
+  if (result.removed_points.empty()) return counts;
+  const cv::Mat kinds = removed_kinds(result.removal, picture);
+  for (const auto& point : result.removed_points) {
+    const Movable kind = kind_at(kinds, point);
+    // Extraction keeps some pixels off the mask, where no class is drawn.
+    ++counts[kind == Movable::kNone ? "margin" : std::string(name_of(kind))];
+  }
+  return counts;
+}
+
+void RemovalTally::add(const FrameResult& result, const cv::Size& picture, const PointCounts& removed) {
   ++frames;
   removed_area += area_share(result.removal, picture);
   kept_points += result.points.size();
-  for (const auto& [kind, count] : removed_by_class(result, picture)) removed_points[kind] += count;
+  for (const auto& [kind, count] : removed) removed_points[kind] += count;
   if (result.removal.label_age >= 0) label_ages.push_back(result.removal.label_age);
   if (result.state == TrackingState::kPredicted) ++predicted;
   constexpr double kLow = 0.5;
   if (result.T_world_camera && result.trust < kLow) ++low_trust;
 }
 
-std::string descriptor_line(const FrameResult& result, const cv::Size& picture,
+std::string descriptor_line(const FrameResult& result, const cv::Size& picture, const PointCounts& removed,
                             const std::string& mask_file) {
   const Eigen::Matrix4i matrix = auxiliary_descriptor(result.removal.objects);
   Json rows = Json::array();
@@ -85,7 +83,7 @@ std::string descriptor_line(const FrameResult& result, const cv::Size& picture,
   line["mask"] = mask_file.empty() ? Json(nullptr) : Json(mask_file);
   line["removed_area"] = rounded(area_share(result.removal, picture), 1e4);
   line["kept_points"] = result.points.size();
-  line["removed_points"] = removed_by_class(result, picture);
+  line["removed_points"] = removed;
   line["objects"] = objects;
   return line.dump();
 }

@@ -11,6 +11,12 @@
 
 namespace roslam {
 
+/// How many points, by the class of what they lie on; "margin" is what lies beside it.
+using PointCounts = std::map<std::string, std::size_t>;
+
+/// What the points that were removed from a frame lay on.
+PointCounts removed_by_class(const FrameResult& result, const cv::Size& picture);
+
 /// Sums over the frames of a run of what was removed.
 struct RemovalTally {
   std::size_t frames = 0;
@@ -19,16 +25,17 @@ struct RemovalTally {
   std::size_t predicted = 0;  ///< frames whose pose is a prediction, as what moves hid the scene
   double removed_area = 0.0;  ///< sum of the shares of the pictures
   std::size_t kept_points = 0;
-  std::map<std::string, std::size_t> removed_points;  ///< by class
+  PointCounts removed_points;     ///< by class
   std::size_t masks_dropped = 0;  ///< masks and pictures not written, as the disk was too slow
   std::vector<int> label_ages;    ///< frames, one a frame with labels
 
-  void add(const FrameResult& result, const cv::Size& picture);
+  void add(const FrameResult& result, const cv::Size& picture, const PointCounts& removed);
 };
 
 /// One line of descriptors.jsonl: what was removed from a frame (see docs/run_folder.md). mask_file: relative
 /// to the run folder; empty if nothing was removed.
-std::string descriptor_line(const FrameResult& result, const cv::Size& picture, const std::string& mask_file);
+std::string descriptor_line(const FrameResult& result, const cv::Size& picture, const PointCounts& removed,
+                            const std::string& mask_file);
 
 /// The objects of a frame in one image: CV_8UC1, 0 = none, else the position of the object in the list plus
 /// one. From the 255th on they share the number 255.

@@ -40,12 +40,9 @@ class FreeSpaceHistory {
   FreeSpaceEvidence examine(const CellGrid& grid, const cv::Mat& depth, const SE3& T_camera_world,
                             double timestamp) const;
 
-  /// Keeps a frame if it is time for another. moving: cells (CV_8UC1, nonzero) that show what moves: they say
-  /// nothing lasting about the scene.
+  /// Keeps a frame if it is time for another. depth: of cells.
   void add(const cv::Mat& depth, const SE3& T_camera_world, double timestamp);
 
-  /// Poses have become meaningless.
-  void clear() { views_.clear(); }
   bool empty() const { return views_.empty(); }
 
  private:

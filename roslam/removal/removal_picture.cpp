@@ -79,6 +79,12 @@ cv::Mat removed_kinds(const Removal& removal, const cv::Size& size) {
   return kinds;
 }
 
+Movable kind_at(const cv::Mat& kinds, const cv::Point2f& point) {
+  const cv::Point pixel(std::clamp(cvRound(point.x), 0, kinds.cols - 1),
+                        std::clamp(cvRound(point.y), 0, kinds.rows - 1));
+  return static_cast<Movable>(kinds.at<std::uint8_t>(pixel));
+}
+
 cv::Mat removal_picture(const cv::Mat& colour, const Removal& removal, const std::vector<cv::Point2f>& points,
                         const std::vector<cv::Point2f>& removed_points) {
   cv::Mat picture = colour.clone();
@@ -97,9 +103,7 @@ cv::Mat removal_picture(const cv::Mat& colour, const Removal& removal, const std
   for (const auto& point : points)
     cv::circle(picture, point, 2, cv::Scalar(removal_colour(Movable::kNone)), cv::FILLED, cv::LINE_AA);
   for (const auto& point : removed_points) {
-    const cv::Point pixel(std::clamp(cvRound(point.x), 0, kinds.cols - 1),
-                          std::clamp(cvRound(point.y), 0, kinds.rows - 1));
-    const auto kind = static_cast<Movable>(kinds.at<std::uint8_t>(pixel));
+    const Movable kind = kind_at(kinds, point);
     draw_cross(picture, point, cv::Scalar(removal_colour(kind == Movable::kNone ? Movable::kUnknown : kind)));
   }
   for (const auto& object : removal.objects) {

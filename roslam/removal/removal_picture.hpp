@@ -15,6 +15,9 @@ cv::Vec3b removal_colour(Movable kind);
 /// around things, for which the nearest thing counts.
 cv::Mat removed_kinds(const Removal& removal, const cv::Size& size);
 
+/// The kind at a point (pixels) of such an image.
+Movable kind_at(const cv::Mat& kinds, const cv::Point2f& point);
+
 /// The frame with what moves tinted and outlined, each thing with its number and class, the points that were
 /// kept as dots and those that were removed as crosses in the colour of what they lie on. All CV_8UC3; points
 /// in pixels of the frame.
