@@ -17,8 +17,8 @@ namespace fs = std::filesystem;
 
 std::vector<std::string> run_arguments(const BenchmarkSequence& sequence, const BenchmarkSettings& settings,
                                        const fs::path& out) {
-  std::vector<std::string> arguments{"run",     sequence.source, "--out", out.string(),
-                                     "--quiet", "--dynamic",     "none"};
+  std::vector<std::string> arguments{"run",     sequence.source, "--out",         out.string(),
+                                     "--quiet", "--dynamic",     settings.dynamic};
   const auto add = [&](const std::string& option, const std::string& value) {
     arguments.push_back(option);
     arguments.push_back(value);
@@ -53,8 +53,9 @@ void read_report(const fs::path& file, BenchmarkRun& run) {
   run.start_up_seconds = time_or_nan(report.at("start_up_seconds").get<double>());
   run.peak_memory_megabytes = report.at("peak_memory_megabytes").get<double>();
   for (const auto& [stage, times] : report.at("processor_milliseconds").items()) {
-    run.stages[stage] = {times.at("count").get<std::size_t>(), times.at("median").get<double>(),
-                         times.at("p95").get<double>(), times.at("max").get<double>()};
+    run.stages[stage] = {times.at("count").get<std::size_t>(), times.at("mean").get<double>(),
+                         times.at("median").get<double>(), times.at("p95").get<double>(),
+                         times.at("max").get<double>()};
   }
 }
 

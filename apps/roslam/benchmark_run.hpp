@@ -18,6 +18,7 @@ namespace roslam::app {
 /// What all runs of a benchmark have in common.
 struct BenchmarkSettings {
   Mode mode = Mode::kDeterministic;
+  std::string dynamic = "none";  ///< what is removed: a name of removal_modes()
   std::string config;            ///< file with options; empty = the defaults
   std::string traffic = "none";  ///< of simulated flights
   std::size_t frames = 300;      ///< of simulated flights; 0 = all

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <set>
 #include <thread>
 
 #include "apps/roslam/benchmark.hpp"
+#include "apps/roslam/benchmark_metrics.hpp"
 #include "apps/roslam/benchmark_report.hpp"
 #include "apps/roslam/benchmark_sequences.hpp"
 #include "apps/roslam/interrupt.hpp"
@@ -38,32 +37,6 @@ DIR then holds benchmark.md, benchmark.json, a figure for each sequence and the 
 Each run is a process of its own. Ctrl-C ends the benchmark and writes what there is.
 Exit code: 0 success, 1 an error in the input or a run that failed, 2 wrong usage.)";
 
-struct Arguments {
-  std::vector<std::string> sequences{"simulated:street"};
-  std::string camera;
-  std::string out;
-  int runs = 3;
-  bool real_time = false;
-  bool json = false;
-  bool quiet = false;
-  BenchmarkSettings settings;
-};
-
-bool is_same(const Trajectory& a, const Trajectory& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const StampedPose& p, const StampedPose& q) {
-    return p.timestamp == q.timestamp && p.T_world_camera.matrix() == q.T_world_camera.matrix();
-  });
-}
-
-std::optional<bool> whether_runs_repeat(const BenchmarkedSequence& sequence) {
-  const auto runs = sequence.complete_runs();
-  if (runs.size() < 2) return std::nullopt;
-  for (const auto* run : runs) {
-    if (!is_same(run->trajectory, runs.front()->trajectory)) return false;
-  }
-  return true;
-}
-
 // Nothing if no run has a trajectory.
 cv::Mat figure_of(const BenchmarkedSequence& sequence) {
   const WorldUp up = sequence.sequence.is_simulated() ? WorldUp::kZ : WorldUp::kUnknown;
@@ -90,37 +63,7 @@ void write_report(const BenchmarkReport& report, const fs::path& out) {
   write_file(out / "benchmark.json", benchmark_json(report));
 }
 
-BenchmarkedSequence measure(const BenchmarkSequence& sequence, const Arguments& arguments,
-                            const std::stop_token& stop) {
-  BenchmarkedSequence result;
-  result.sequence = sequence;
-  for (int i = 1; i <= arguments.runs && !stop.stop_requested(); ++i) {
-    if (!arguments.quiet)
-      std::fprintf(stderr, "%s: run %d of %d\n", sequence.name.c_str(), i, arguments.runs);
-    const std::string folder = "runs/" + sequence.name + "-" + std::to_string(i);
-    result.runs.push_back(run_sequence(sequence, arguments.settings, arguments.out, folder, stop));
-    if (const auto& run = result.runs.back(); !run.failure.empty() && !run.is_interrupted) {
-      std::fprintf(stderr, "note: %s: run %d: %s\n", sequence.name.c_str(), i, run.failure.c_str());
-    }
-  }
-  result.repeats = whether_runs_repeat(result);
-  if (const cv::Mat figure = figure_of(result); !figure.empty()) {
-    result.figure = sequence.name + ".png";
-    write_png(fs::path(arguments.out) / result.figure, figure);
-  }
-  return result;
-}
-
-void throw_if_any_failed(const BenchmarkReport& report) {
-  for (const auto& sequence : report.sequences) {
-    for (const auto& run : sequence.runs) {
-      if (run.is_interrupted || run.failure.empty()) continue;
-      throw InputError(sequence.sequence.name + ": a run failed: " + run.failure);
-    }
-  }
-}
-
-void execute(const Arguments& arguments, const std::string& version) {
+void execute(const BenchmarkArguments& arguments, const std::string& version) {
   const InterruptWatcher interrupt;
   const fs::path out = arguments.out;
   make_folder(out);
@@ -137,7 +80,12 @@ void execute(const Arguments& arguments, const std::string& version) {
   write_report(report, out);
   for (const auto& sequence : sequences) {
     if (interrupt.token().stop_requested()) break;
-    report.sequences.push_back(measure(sequence, arguments, interrupt.token()));
+    auto result = measure(sequence, arguments.settings, sequence.name, arguments, interrupt.token());
+    if (const cv::Mat figure = figure_of(result); !figure.empty()) {
+      result.figure = sequence.name + ".png";
+      write_png(out / result.figure, figure);
+    }
+    report.sequences.push_back(std::move(result));
     report.is_interrupted = interrupt.token().stop_requested();
     write_report(report, out);
   }
@@ -145,48 +93,18 @@ void execute(const Arguments& arguments, const std::string& version) {
   std::cout << (arguments.json ? benchmark_json(report) : benchmark_summary(report));
   if (!arguments.json) std::cout << "results: " << (out / "benchmark.md").string() << "\n";
   require_written_output();
-  throw_if_any_failed(report);
+  for (const auto& sequence : report.sequences) throw_if_any_failed(sequence);
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
-  command
-      .add_option("--sequences", arguments.sequences,
-                  "What to run: FOLDER, FOLDER:CAMERA or simulated:FLIGHT")
-      ->type_name("DIR")
-      ->capture_default_str();
-  command.add_option("--camera", arguments.camera,
-                     "Camera of the folders that name none: a preset or a YAML file");
-  command.add_option("--out", arguments.out, "Folder the report is written to; made if it does not exist")
-      ->required()
-      ->type_name("DIR");
-  command.add_option("--runs", arguments.runs, "Runs of each sequence")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  command.add_flag(
-      "--real-time", arguments.real_time,
-      "Frames at the pace of their timestamps, late ones dropped; without it stages run in lock-step");
-  command.add_option("--config", arguments.settings.config, "YAML file with options for all runs");
-  command.add_option("--traffic", arguments.settings.traffic, "Of simulated flights: none, light or heavy")
-      ->check(CLI::IsMember({"none", "light", "heavy"}))
-      ->capture_default_str();
-  command.add_option("--frames", arguments.settings.frames, "Of simulated flights; 0 = all")
-      ->capture_default_str();
-  command.add_option("--seed", arguments.settings.seed, "Of simulated flights")->capture_default_str();
-  command.add_flag("--quiet", arguments.quiet, "No progress");
-  command.add_flag("--json", arguments.json, "Print the report as one JSON object");
-}
 }  // namespace
 
 void add_benchmark_static_command(CLI::App& benchmark, const std::string& version) {
   auto* command =
       benchmark.add_subcommand("static", "Run sequences in which nothing moves, several times each.");
-  const auto arguments = std::make_shared<Arguments>();
-  add_options(*command, *arguments);
+  const auto arguments = std::make_shared<BenchmarkArguments>();
+  add_benchmark_options(*command, *arguments);
   command->footer(kExamples);
-  command->callback([arguments, version] {
-    if (arguments->real_time) arguments->settings.mode = Mode::kRealTime;
-    execute(*arguments, version);
-  });
+  command->callback([arguments, version] { execute(*arguments, version); });
 }
 
 }  // namespace roslam::app

@@ -185,8 +185,10 @@ void add_run_command(CLI::App& program, const std::string& version) {
       ->add_option(
           "--dynamic", arguments->dynamic,
           "How what moves is found and removed: none, labels (a network's persons, cars, bicycles), geometry "
-          "(depth and optical flow) or both; default both, or as --config says")
-      ->check(CLI::IsMember({"none", "labels", "geometry", "both"}));
+          "(depth and optical flow) or both; default both, or as --config says. For comparison: "
+          "ds-slam-like, "
+          "dynaslam-like")
+      ->check(CLI::IsMember(removal_modes()));
   command->add_option(
       "--model", arguments->model,
       "Weights of the network that labels (ONNX), in place of those that come with the program");

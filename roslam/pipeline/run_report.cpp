@@ -77,6 +77,7 @@ Json times_json(const StageTimes& times) {
   Json json = Json::object();
   for (const auto& [stage, s] : times.summary()) {
     json[stage] = {{"count", s.count},
+                   {"mean", rounded(s.mean_ms, 3)},
                    {"median", rounded(s.median_ms, 3)},
                    {"p95", rounded(s.p95_ms, 3)},
                    {"max", rounded(s.max_ms, 3)}};

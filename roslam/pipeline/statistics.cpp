@@ -9,6 +9,7 @@
 #include <ctime>
 #include <fstream>
 #include <limits>
+#include <numeric>
 #include <sstream>
 
 namespace roslam {
@@ -29,7 +30,9 @@ std::map<std::string, StageSummary> StageTimes::summary() const {
       const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(sorted.size())));
       return 1e3 * sorted[std::max<std::size_t>(rank, 1) - 1];
     };
-    result[stage] = {sorted.size(), quantile(0.5), quantile(0.95), 1e3 * sorted.back()};
+    const double mean =
+        1e3 * std::accumulate(sorted.begin(), sorted.end(), 0.0) / static_cast<double>(sorted.size());
+    result[stage] = {sorted.size(), mean, quantile(0.5), quantile(0.95), 1e3 * sorted.back()};
   }
   return result;
 }

@@ -11,6 +11,7 @@ namespace roslam {
 /// Distribution of a stage's times.
 struct StageSummary {
   std::size_t count = 0;
+  double mean_ms = 0.0;
   double median_ms = 0.0;
   double p95_ms = 0.0;
   double max_ms = 0.0;

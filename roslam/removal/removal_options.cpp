@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/removal/removal_options.hpp"
 
+#include <algorithm>
+#include <array>
 #include <string>
 
 #include "roslam/error.hpp"
@@ -31,28 +33,50 @@ void RemovalOptions::validate() const {
   require(scarce_points >= 0, "scarce_points must not be negative");
 }
 
+namespace {
+struct NamedMode {
+  std::string_view name;
+  bool labels;
+  bool free_space;
+  bool flow;
+};
+
+// Where two could be meant, mode_of takes the first.
+constexpr std::array kModes{
+    NamedMode{"none", false, false, false},       NamedMode{"labels", true, false, false},
+    NamedMode{"geometry", false, true, true},     NamedMode{"both", true, true, true},
+    NamedMode{"ds-slam-like", true, false, true}, NamedMode{"dynaslam-like", true, true, false}};
+}  // namespace
+
+std::vector<std::string> removal_modes() {
+  std::vector<std::string> names;
+  for (const NamedMode& mode : kModes) names.emplace_back(mode.name);
+  return names;
+}
+
 std::optional<RemovalOptions> removal_from(std::string_view mode, const RemovalOptions& base) {
+  const auto* const found =
+      std::find_if(kModes.begin(), kModes.end(), [&](const NamedMode& known) { return known.name == mode; });
+  if (found == kModes.end()) return std::nullopt;
   RemovalOptions options = base;
-  if (mode == "none") {
-    options.labels = options.free_space = options.flow = false;
-  } else if (mode == "labels") {
-    options.labels = true;
-    options.free_space = options.flow = false;
-  } else if (mode == "geometry") {
-    options.labels = false;
-    options.free_space = options.flow = true;
-  } else if (mode == "both") {
-    options.labels = options.free_space = options.flow = true;
-  } else {
-    return std::nullopt;
+  options.labels = found->labels;
+  options.free_space = found->free_space;
+  options.flow = found->flow;
+  if (mode == "ds-slam-like") {
+    options.sure = 1.0;
+    options.refine = false;
+  } else if (mode == "dynaslam-like") {
+    options.sure = 0.0;
   }
   return options;
 }
 
 std::string_view mode_of(const RemovalOptions& options) {
-  const bool geometry = options.free_space || options.flow;
-  if (options.labels) return geometry ? "both" : "labels";
-  return geometry ? "geometry" : "none";
+  const auto* const found = std::find_if(kModes.begin(), kModes.end(), [&](const NamedMode& known) {
+    return known.labels == options.labels && known.free_space == options.free_space &&
+           known.flow == options.flow;
+  });
+  return found == kModes.end() ? "geometry" : found->name;
 }
 
 }  // namespace roslam

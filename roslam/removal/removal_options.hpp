@@ -2,7 +2,9 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace roslam {
 
@@ -44,7 +46,19 @@ struct RemovalOptions {
   bool is_on() const { return labels || free_space || flow; }
 };
 
-/// What `--dynamic` knows: none, labels, geometry, both. Nothing for another name.
+/// What `--dynamic` knows, and how other systems are stood in for:
+///   none           nothing is removed, as in ORB-SLAM2
+///   labels         what a network labels as movable goes
+///   geometry       what depth and optical flow show to move goes
+///   both           the two together: RO-SLAM
+///   ds-slam-like   labelled things go unless the optical flow finds them at rest, as in DS-SLAM (Yu et al.,
+///                  IROS 2018), and so do unlabelled things that it sees moving
+///   dynaslam-like  all labelled things go, and what the depth of earlier views contradicts, as in DynaSLAM
+///                  (Bescos et al., RA-L 2018)
+/// The last two are our parts put together in their manner, with our network; they are not those systems.
+std::vector<std::string> removal_modes();
+
+/// base in one of these modes. Nothing for another name.
 std::optional<RemovalOptions> removal_from(std::string_view mode, const RemovalOptions& base = {});
 
 /// The name of the mode that these options come closest to.

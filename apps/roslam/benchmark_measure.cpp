@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/benchmark_measure.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "roslam/error.hpp"
+
+namespace roslam::app {
+
+namespace {
+bool is_same(const Trajectory& a, const Trajectory& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const StampedPose& p, const StampedPose& q) {
+    return p.timestamp == q.timestamp && p.T_world_camera.matrix() == q.T_world_camera.matrix();
+  });
+}
+
+std::optional<bool> whether_runs_repeat(const BenchmarkedSequence& sequence) {
+  const auto runs = sequence.complete_runs();
+  if (runs.size() < 2) return std::nullopt;
+  for (const auto* run : runs) {
+    if (!is_same(run->trajectory, runs.front()->trajectory)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<const BenchmarkRun*> BenchmarkedSequence::complete_runs() const {
+  std::vector<const BenchmarkRun*> complete;
+  for (const auto& run : runs) {
+    if (run.is_complete()) complete.push_back(&run);
+  }
+  return complete;
+}
+
+BenchmarkedSequence measure(const BenchmarkSequence& sequence, const BenchmarkSettings& settings,
+                            const std::string& name, const BenchmarkArguments& arguments,
+                            const std::stop_token& stop) {
+  BenchmarkedSequence result;
+  result.sequence = sequence;
+  for (int i = 1; i <= arguments.runs && !stop.stop_requested(); ++i) {
+    if (!arguments.quiet) std::fprintf(stderr, "%s: run %d of %d\n", name.c_str(), i, arguments.runs);
+    const std::string folder = "runs/" + name + "-" + std::to_string(i);
+    result.runs.push_back(run_sequence(sequence, settings, arguments.out, folder, stop));
+    if (const auto& run = result.runs.back(); !run.failure.empty() && !run.is_interrupted) {
+      std::fprintf(stderr, "note: %s: run %d: %s\n", name.c_str(), i, run.failure.c_str());
+    }
+  }
+  result.repeats = whether_runs_repeat(result);
+  return result;
+}
+
+void throw_if_any_failed(const BenchmarkedSequence& sequence) {
+  for (const auto& run : sequence.runs) {
+    if (run.is_interrupted || run.failure.empty()) continue;
+    throw InputError(sequence.sequence.name + ": a run failed: " + run.failure);
+  }
+}
+
+void add_benchmark_options(CLI::App& command, BenchmarkArguments& arguments) {
+  command
+      .add_option("--sequences", arguments.sequences,
+                  "What to run: FOLDER, FOLDER:CAMERA or simulated:FLIGHT")
+      ->type_name("DIR")
+      ->capture_default_str();
+  command.add_option("--camera", arguments.camera,
+                     "Camera of the folders that name none: a preset or a YAML file");
+  command.add_option("--out", arguments.out, "Folder the report is written to; made if it does not exist")
+      ->required()
+      ->type_name("DIR");
+  command.add_option("--runs", arguments.runs, "Runs of each sequence")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_flag_callback(
+      "--real-time", [&settings = arguments.settings] { settings.mode = Mode::kRealTime; },
+      "Frames at the pace of their timestamps, late ones dropped; without it stages run in lock-step");
+  command.add_option("--config", arguments.settings.config, "YAML file with options for all runs");
+  command.add_option("--traffic", arguments.settings.traffic, "Of simulated flights: none, light or heavy")
+      ->check(CLI::IsMember({"none", "light", "heavy"}))
+      ->capture_default_str();
+  command.add_option("--frames", arguments.settings.frames, "Of simulated flights; 0 = all")
+      ->capture_default_str();
+  command.add_option("--seed", arguments.settings.seed, "Of simulated flights")->capture_default_str();
+  command.add_flag("--quiet", arguments.quiet, "No progress");
+  command.add_flag("--json", arguments.json, "Print the report as one JSON object");
+}
+
+}  // namespace roslam::app

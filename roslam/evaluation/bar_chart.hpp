@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace roslam {
+
+/// Some values side by side, such as the errors of one sequence by method.
+struct BarGroup {
+  std::string name;
+  std::vector<double> values;  ///< one a series; what is not finite or not above 0 gets no bar but a "-"
+};
+
+struct BarChart {
+  std::string title;
+  std::string value_label;          ///< what the values are, with their unit
+  std::vector<std::string> series;  ///< names for the legend, in the order of the values
+  std::vector<BarGroup> groups;
+  int decimals = 3;  ///< of the value that stands on each bar
+};
+
+/// The chart as a picture (CV_8UC3). The scale is logarithmic, as errors differ by factors, and each bar
+/// bears its value. Throws InputError if a group has not one value a series.
+cv::Mat draw_bar_chart(const BarChart& chart);
+
+}  // namespace roslam
