@@ -10,6 +10,7 @@ void add_benchmark_command(CLI::App& program, const std::string& version) {
       program.add_subcommand("benchmark", "Measure accuracy, time and memory over whole sequences.");
   benchmark->require_subcommand(1);
   add_benchmark_static_command(*benchmark, version);
+  add_benchmark_dynamic_command(*benchmark, version);
 }
 
 }  // namespace roslam::app

@@ -12,6 +12,7 @@
 namespace roslam::app {
 
 namespace {
+using Json = nlohmann::ordered_json;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 double error_or_unknown(const BenchmarkRun& run, const std::function<double(const TrajectoryError&)>& value) {
@@ -21,6 +22,16 @@ double error_or_unknown(const BenchmarkRun& run, const std::function<double(cons
 double tracking_time(const BenchmarkRun& run, double StageSummary::*value) {
   const auto found = run.stages.find("tracking");
   return found == run.stages.end() ? kUnknown : found->second.*value;
+}
+
+Json json_of(const BenchmarkRun& run) {
+  Json json{{"folder", run.folder}, {"interrupted", run.is_interrupted}};
+  json["failure"] = run.failure.empty() ? Json(nullptr) : Json(run.failure);
+  if (!run.failure.empty()) return json;
+  for (const auto& metric : benchmark_metrics()) json[metric.key] = json_number(metric.of(run));
+  json["frames_per_second"] = json_number(run.frames_per_second);
+  json["no_accuracy_because"] = run.error ? Json(nullptr) : Json(run.no_error_reason);
+  return json;
 }
 
 }  // namespace
@@ -97,6 +108,28 @@ nlohmann::ordered_json json_number(double value) {
   if (!std::isfinite(value)) return nullptr;
   if (value == std::trunc(value) && std::abs(value) < 1e15) return static_cast<std::int64_t>(value);
   return value;
+}
+
+nlohmann::ordered_json json_of(const BenchmarkedSequence& sequence) {
+  Json json{{"name", sequence.sequence.name}, {"source", sequence.sequence.source}};
+  json["camera"] = sequence.sequence.camera.empty() ? Json(nullptr) : Json(sequence.sequence.camera);
+  json["complete_runs"] = sequence.complete_runs().size();
+  json["repeats"] = sequence.repeats ? Json(*sequence.repeats) : Json(nullptr);
+  json["figure"] = sequence.figure.empty() ? Json(nullptr) : Json(sequence.figure);
+  for (const auto& metric : benchmark_metrics())
+    json["median"][metric.key] = json_number(median_of(sequence, metric.of));
+  json["stages"] = Json::object();
+  for (const auto& stage : stages_of(sequence)) {
+    json["stages"][stage] = {
+        {"count", json_number(stage_count(sequence, stage))},
+        {"mean_ms", json_number(stage_median(sequence, stage, &StageSummary::mean_ms))},
+        {"median_ms", json_number(stage_median(sequence, stage, &StageSummary::median_ms))},
+        {"p95_ms", json_number(stage_median(sequence, stage, &StageSummary::p95_ms))},
+        {"max_ms", json_number(stage_median(sequence, stage, &StageSummary::max_ms))}};
+  }
+  json["runs"] = Json::array();
+  for (const auto& run : sequence.runs) json["runs"].push_back(json_of(run));
+  return json;
 }
 
 const char* name_of(Mode mode) { return mode == Mode::kDeterministic ? "deterministic" : "real-time"; }

@@ -39,6 +39,9 @@ std::set<std::string> stages_of(const BenchmarkedSequence& sequence);
 /// A number in a report: counts without a point, null for what is not known.
 nlohmann::ordered_json json_number(double value);
 
+/// All that is known of a sequence: medians, stages, each run.
+nlohmann::ordered_json json_of(const BenchmarkedSequence& sequence);
+
 /// "deterministic" or "real-time".
 const char* name_of(Mode mode);
 

@@ -60,37 +60,6 @@ std::string section_of(const BenchmarkedSequence& sequence) {
   return text.str();
 }
 
-Json json_of(const BenchmarkRun& run) {
-  Json json{{"folder", run.folder}, {"interrupted", run.is_interrupted}};
-  json["failure"] = run.failure.empty() ? Json(nullptr) : Json(run.failure);
-  if (!run.failure.empty()) return json;
-  for (const auto& metric : benchmark_metrics()) json[metric.key] = json_number(metric.of(run));
-  json["frames_per_second"] = json_number(run.frames_per_second);
-  json["no_accuracy_because"] = run.error ? Json(nullptr) : Json(run.no_error_reason);
-  return json;
-}
-
-Json json_of(const BenchmarkedSequence& sequence) {
-  Json json{{"name", sequence.sequence.name}, {"source", sequence.sequence.source}};
-  json["camera"] = sequence.sequence.camera.empty() ? Json(nullptr) : Json(sequence.sequence.camera);
-  json["complete_runs"] = sequence.complete_runs().size();
-  json["repeats"] = sequence.repeats ? Json(*sequence.repeats) : Json(nullptr);
-  json["figure"] = sequence.figure.empty() ? Json(nullptr) : Json(sequence.figure);
-  for (const auto& metric : benchmark_metrics())
-    json["median"][metric.key] = json_number(median_of(sequence, metric.of));
-  json["stages"] = Json::object();
-  for (const auto& stage : stages_of(sequence)) {
-    json["stages"][stage] = {
-        {"count", json_number(stage_count(sequence, stage))},
-        {"median_ms", json_number(stage_median(sequence, stage, &StageSummary::median_ms))},
-        {"p95_ms", json_number(stage_median(sequence, stage, &StageSummary::p95_ms))},
-        {"max_ms", json_number(stage_median(sequence, stage, &StageSummary::max_ms))}};
-  }
-  json["runs"] = Json::array();
-  for (const auto& run : sequence.runs) json["runs"].push_back(json_of(run));
-  return json;
-}
-
 constexpr auto kLegend = R"(
 - tracked: share of the sequence's frames that got a pose; dropped: frames that came while the tracker was busy.
 - ATE: distance from the truth after the best rigid alignment, SE(3), of the whole path; RPE: error of the motion

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <thread>
+
+#include "apps/roslam/benchmark.hpp"
+#include "apps/roslam/benchmark_measure.hpp"
+#include "apps/roslam/benchmark_metrics.hpp"
+#include "apps/roslam/dynamic_report.hpp"
+#include "apps/roslam/interrupt.hpp"
+#include "apps/roslam/output.hpp"
+#include "roslam/error.hpp"
+#include "roslam/evaluation/trajectory_plot.hpp"
+#include "roslam/semantics/pspnet_segmenter.hpp"
+#include "roslam/write_file.hpp"
+
+namespace roslam::app {
+
+namespace {
+namespace fs = std::filesystem;
+
+constexpr auto kExamples = R"(Examples:
+  The simulated street with traffic and without, nothing to download:
+    roslam benchmark dynamic --out results
+  A sequence composed with people; what it was made of is run for comparison:
+    roslam compose kitchen --camera 7scenes --people people --out kitchen_people
+    roslam benchmark dynamic --sequences kitchen_people --out results
+  Tables 3 and 5 of the paper, next to its figures:
+    scripts/get_tum --out tum
+    roslam benchmark dynamic --tum tum --runs 10 --out results
+  Sequences and their twins of other origin; two modes only, as live as the machine can:
+    roslam benchmark dynamic --sequences busy:tum-fr1 --twins quiet:tum-fr1 --modes none both --real-time --out results
+
+A sequence is FOLDER, FOLDER:CAMERA (TUM RGB-D format) or simulated:street, :loop, :hover, :turn. CAMERA is a preset
+(tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a YAML file. Without one, --camera counts, then a camera.yaml in the
+folder. The truth is the folder's groundtruth.txt; where it is missing the accuracy is left open ("-").
+DIR then holds benchmark.md with tables and a bar chart, benchmark.json, a figure for each sequence and the folder of
+each run under runs/. Each run is a process of its own. Ctrl-C ends the benchmark and writes what there is.
+Exit code: 0 success, 1 an error in the input or a run that failed, 2 wrong usage.)";
+
+struct DynamicArguments {
+  BenchmarkArguments common;
+  std::vector<std::string> modes = removal_modes();
+  std::vector<std::string> twins;
+  std::string tum;
+};
+
+// One curve a mode: that of its first run with an accuracy.
+cv::Mat figure_of(const DynamicResult& result, const std::vector<std::string>& modes) {
+  const WorldUp up = result.sequence.is_simulated() ? WorldUp::kZ : WorldUp::kUnknown;
+  const Trajectory* truth = nullptr;
+  std::vector<NamedTrajectoryError> curves;
+  for (std::size_t i = 0; i < result.by_mode.size(); ++i) {
+    for (const auto* run : result.by_mode[i].complete_runs()) {
+      if (!run->error) continue;
+      curves.push_back({modes[i], *run->error});
+      truth = &run->truth;
+      break;
+    }
+  }
+  return truth == nullptr ? cv::Mat() : plot_trajectory_errors(*truth, curves, up);
+}
+
+// What is known so far is written after each mode of a sequence: a power cut costs one of them, not the
+// night.
+void write_report(DynamicReport& report, const fs::path& out) {
+  if (const cv::Mat bars = dynamic_bars(report); !bars.empty()) {
+    report.bars = "bars.png";
+    write_png(out / report.bars, bars);
+  }
+  write_file(out / "benchmark.md", dynamic_markdown(report));
+  write_file(out / "benchmark.json", dynamic_json(report));
+}
+
+void measure_modes(const DynamicSequence& pair, const BenchmarkArguments& arguments, DynamicReport& report,
+                   const std::stop_token& stop) {
+  report.results.push_back({pair.sequence, pair.twin.has_value(), {}, {}, ""});
+  DynamicResult& result = report.results.back();
+  for (const auto& mode : report.modes) {
+    BenchmarkSettings settings = arguments.settings;
+    settings.dynamic = mode;
+    const auto add = [&](const BenchmarkSequence& sequence, std::vector<BenchmarkedSequence>& to) {
+      if (stop.stop_requested()) return;
+      to.push_back(measure(sequence, settings, sequence.name + "-" + mode, arguments, stop));
+      report.is_interrupted = stop.stop_requested();
+      write_report(report, arguments.out);
+    };
+    add(pair.sequence, result.by_mode);
+    if (pair.twin) {
+      settings.traffic = "none";
+      add(*pair.twin, result.twin_by_mode);
+    }
+  }
+  if (const cv::Mat figure = figure_of(result, report.modes); !figure.empty()) {
+    result.figure = pair.sequence.name + ".png";
+    write_png(fs::path(arguments.out) / result.figure, figure);
+  }
+}
+
+void require_weights(const std::vector<std::string>& modes) {
+  const bool needs_labels =
+      std::any_of(modes.begin(), modes.end(), [](const auto& mode) { return removal_from(mode)->labels; });
+  if (needs_labels && shipped_segmentation_model().empty()) throw missing_segmentation_model();
+}
+
+void execute(DynamicArguments arguments, const std::string& version) {
+  const InterruptWatcher interrupt;
+  BenchmarkArguments& common = arguments.common;
+  const fs::path out = common.out;
+  make_folder(out);
+  // What is wrong for every run shall be found before the first.
+  if (!common.settings.config.empty()) read_options(common.settings.config);
+  require_weights(arguments.modes);
+  const auto pairs = find_dynamic_sequences(
+      {common.sequences, arguments.twins, common.camera, arguments.tum, common.settings.traffic != "none"},
+      out);
+  DynamicReport report{version,
+                       processor_model(),
+                       std::thread::hardware_concurrency(),
+                       common.runs,
+                       false,
+                       common.settings,
+                       arguments.modes,
+                       {},
+                       ""};
+  write_report(report, out);
+  for (const auto& pair : pairs) {
+    if (interrupt.token().stop_requested()) break;
+    measure_modes(pair, common, report, interrupt.token());
+    write_report(report, out);
+  }
+  if (report.is_interrupted) std::fprintf(stderr, "interrupted: the report holds what was complete\n");
+  std::cout << (common.json ? dynamic_json(report) : dynamic_summary(report));
+  if (!common.json) std::cout << "results: " << (out / "benchmark.md").string() << "\n";
+  require_written_output();
+  for (const auto& result : report.results) {
+    for (const auto& sequence : result.by_mode) throw_if_any_failed(sequence);
+    for (const auto& sequence : result.twin_by_mode) throw_if_any_failed(sequence);
+  }
+}
+}  // namespace
+
+void add_benchmark_dynamic_command(CLI::App& benchmark, const std::string& version) {
+  auto* command = benchmark.add_subcommand(
+      "dynamic", "Run sequences in which things move in each mode of removal, and their twins without.");
+  const auto arguments = std::make_shared<DynamicArguments>();
+  arguments->common.settings.traffic = "heavy";
+  add_benchmark_options(*command, arguments->common);
+  const auto* sequences = command->get_option("--sequences");
+  command->add_option("--modes", arguments->modes, "What is removed: values of --dynamic of `roslam run`")
+      ->check(CLI::IsMember(removal_modes()))
+      ->capture_default_str();
+  command
+      ->add_option("--twins", arguments->twins,
+                   "The same sequences without what moves, one for each of --sequences, - where there is "
+                   "none; default: those that simulated and composed sequences have by nature")
+      ->type_name("DIR");
+  command
+      ->add_option("--tum", arguments->tum,
+                   "Folder that scripts/get_tum filled: runs what it holds of table 3 of the paper")
+      ->type_name("DIR");
+  command->footer(kExamples);
+  command->callback([arguments, sequences, version] {
+    // The street is for those who name nothing else.
+    if (sequences->empty() && !arguments->tum.empty()) arguments->common.sequences.clear();
+    execute(*arguments, version);
+  });
+}
+
+}  // namespace roslam::app

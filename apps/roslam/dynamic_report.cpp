@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/dynamic_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "apps/roslam/benchmark_metrics.hpp"
+#include "apps/roslam/paper_tables.hpp"
+#include "roslam/evaluation/markdown_table.hpp"
+#include "roslam/evaluation/statistics.hpp"
+
+namespace roslam::app {
+
+namespace {
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double kPercent = 100.0;
+
+using Results = std::vector<BenchmarkedSequence>;
+
+// An error over a part of the frames is marked, or losing track would look like accuracy.
+std::string error_cell(const Results& results, std::size_t mode) {
+  if (mode >= results.size()) return "-";
+  const double tracked = median_of(results[mode], tracked_share_of);
+  constexpr double kAll = 0.9995;
+  const std::string error = fixed(ate_in(results, mode), 4);
+  if (!std::isfinite(tracked) || tracked >= kAll) return error;
+  return error + " (" + fixed(kPercent * tracked, 1) + " % tracked)";
+}
+
+const PaperError* published(const std::vector<PaperError>& table, const BenchmarkSequence& sequence) {
+  const auto found = std::find_if(table.begin(), table.end(),
+                                  [&](const PaperError& row) { return sequence.name == tum_folder_of(row); });
+  return found == table.end() ? nullptr : &*found;
+}
+
+std::string table_of_errors(const DynamicReport& report) {
+  const auto paper = paper_table_3();
+  const bool has_published = std::any_of(report.results.begin(), report.results.end(), [&](const auto& r) {
+    return published(paper, r.sequence) != nullptr;
+  });
+  std::vector<TableRow> rows{{"ATE RMSE, m"}};
+  for (const auto& mode : report.modes) rows.front().push_back(title_of_mode(mode));
+  if (has_published) {
+    for (const char* system : {"ORB-SLAM2", "DS-SLAM", "DynaSLAM", "RO-SLAM"})
+      rows.front().push_back(std::string("paper: ") + system);
+  }
+  for (const auto& result : report.results) {
+    rows.push_back({table_cell(result.sequence.name)});
+    for (std::size_t i = 0; i < report.modes.size(); ++i)
+      rows.back().push_back(error_cell(result.by_mode, i));
+    if (const PaperError* row = published(paper, result.sequence)) {
+      for (const double value : {row->orb_slam2, row->ds_slam, row->dynaslam, row->ro_slam})
+        rows.back().push_back(fixed(value, 4));
+    }
+    if (!result.has_twin) continue;
+    rows.push_back({"- nothing moving"});
+    for (std::size_t i = 0; i < report.modes.size(); ++i)
+      rows.back().push_back(error_cell(result.twin_by_mode, i));
+  }
+  return markdown_table(rows);
+}
+
+// Of each mode, how many times the error is that of the twin without removal.
+std::string table_of_ratios(const DynamicReport& report) {
+  const auto none = std::find(report.modes.begin(), report.modes.end(), "none");
+  if (none == report.modes.end()) return "";
+  std::vector<TableRow> rows{{"times the error"}};
+  for (const auto& mode : report.modes) rows.front().push_back(title_of_mode(mode));
+  for (const auto& result : report.results) {
+    const double base = ate_in(result.twin_by_mode, static_cast<std::size_t>(none - report.modes.begin()));
+    if (!std::isfinite(base)) continue;
+    rows.push_back({table_cell(result.sequence.name)});
+    for (std::size_t i = 0; i < report.modes.size(); ++i)
+      rows.back().push_back(fixed(ate_in(result.by_mode, i) / base, 2));
+    rows.push_back({"- nothing moving"});
+    for (std::size_t i = 0; i < report.modes.size(); ++i)
+      rows.back().push_back(fixed(ate_in(result.twin_by_mode, i) / base, 2));
+  }
+  if (rows.size() == 1) return "";
+  return "\n## Against the same frames with nothing moving and nothing removed\n\n" + markdown_table(rows);
+}
+
+double over_sequences(const DynamicReport& report, std::size_t mode,
+                      const std::function<double(const BenchmarkedSequence&)>& value) {
+  std::vector<double> values;
+  for (const auto& result : report.results) {
+    if (mode >= result.by_mode.size()) continue;
+    if (const double one = value(result.by_mode[mode]); std::isfinite(one)) values.push_back(one);
+  }
+  return median(std::move(values));
+}
+
+std::string table_of_times(const DynamicReport& report) {
+  std::vector<TableRow> rows{{"ms a frame", "tracking mean", "median", "p95", "network mean", "dropped"}};
+  for (std::size_t i = 0; i < report.modes.size(); ++i) {
+    const auto stage = [&](const char* name, double StageSummary::*value) {
+      return fixed(over_sequences(report, i, [&](const auto& s) { return stage_median(s, name, value); }), 1);
+    };
+    rows.push_back({title_of_mode(report.modes[i]), stage("tracking", &StageSummary::mean_ms),
+                    stage("tracking", &StageSummary::median_ms), stage("tracking", &StageSummary::p95_ms),
+                    stage("segmentation", &StageSummary::mean_ms),
+                    fixed(over_sequences(report, i,
+                                         [](const auto& s) {
+                                           return median_of(s, [](const auto& run) { return run.dropped; });
+                                         }),
+                          0)});
+  }
+  for (const auto& [method, milliseconds] : paper_table_5())
+    rows.push_back({"paper: " + method, fixed(milliseconds, 2), "-", "-", "-", "-"});
+  return markdown_table(rows);
+}
+
+std::string remarks_of(const DynamicReport& report) {
+  std::ostringstream text;
+  const auto remark = [&](const BenchmarkedSequence& sequence, const std::string& mode) {
+    for (std::size_t i = 0; i < sequence.runs.size(); ++i) {
+      const BenchmarkRun& run = sequence.runs[i];
+      std::string what;
+      if (run.is_interrupted)
+        what = "was interrupted";
+      else if (!run.failure.empty())
+        what = "failed: " + run.failure;
+      else if (!run.error)
+        what = "has no accuracy: " + run.no_error_reason;
+      if (!what.empty())
+        text << "\n" << sequence.sequence.name << ", " << mode << ": run " << i + 1 << " " << what << ".\n";
+    }
+    if (sequence.repeats && !*sequence.repeats && report.settings.mode == Mode::kDeterministic)
+      text << "\n" << sequence.sequence.name << ", " << mode << ": the runs differ.\n";
+  };
+  for (const auto& result : report.results) {
+    for (std::size_t i = 0; i < result.by_mode.size(); ++i) remark(result.by_mode[i], report.modes[i]);
+    for (std::size_t i = 0; i < result.twin_by_mode.size(); ++i)
+      remark(result.twin_by_mode[i], report.modes[i]);
+  }
+  return text.str();
+}
+
+constexpr auto kLegend = R"(
+- ATE: distance from the truth after the best rigid alignment, SE(3), of the whole path, root mean square. All frames
+  were tracked where no share is given.
+- nothing moving: the same frames without what moves: a simulated flight without traffic, or what a composed sequence
+  was made of.
+- none, labels, geometry, both: what finds what moves; nothing, the network, depth and optical flow, the two together.
+  ds-slam-like and dynaslam-like put the parts of RO-SLAM together in the manner of those systems, with the network of
+  RO-SLAM; they are not those systems.
+- paper: tables 3 and 5 as published, medians and means of ten runs, measured on another computer with a GPU.
+)";
+
+constexpr auto kTimesLegend = R"(
+Processor time, medians over runs and sequences. Tracking goes from the picture to its pose; the network runs beside it on
+a thread of its own, and in real time labels as many frames as it can.
+)";
+}  // namespace
+
+std::string dynamic_summary(const DynamicReport& report) { return table_of_errors(report); }
+
+std::string dynamic_markdown(const DynamicReport& report) {
+  std::ostringstream text;
+  text << "# Where things move\n\nRO-SLAM " << report.version << ", " << name_of(report.settings.mode) << ", "
+       << report.runs
+       << " runs of each sequence in each mode, medians over the runs. Machine: " << report.processor << ", "
+       << report.cores << " cores.\n";
+  if (report.is_interrupted) text << "\n**Interrupted: sequences and runs are missing.**\n";
+  text << "\n## Error of the trajectory (table 3 of the paper)\n\n" << table_of_errors(report) << kLegend;
+  if (!report.bars.empty()) text << "\n![Errors by mode](" << report.bars << ")\n";
+  text << table_of_ratios(report);
+  text << "\n## Time (table 5 of the paper)\n\n" << table_of_times(report) << kTimesLegend;
+  if (const std::string remarks = remarks_of(report); !remarks.empty()) text << "\n## Remarks\n" << remarks;
+  for (const auto& result : report.results) {
+    if (result.figure.empty()) continue;
+    text << "\n## " << result.sequence.name << "\n\n![Trajectories of " << result.sequence.name << "]("
+         << result.figure << ")\n";
+  }
+  return text.str();
+}
+
+}  // namespace roslam::app

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/roslam/benchmark_measure.hpp"
+#include "apps/roslam/dynamic_sequences.hpp"
+
+namespace roslam::app {
+
+/// What one sequence came to in each mode of removal, and its twin; both in the order of the report's modes,
+/// shorter if the benchmark was interrupted.
+struct DynamicResult {
+  BenchmarkSequence sequence;
+  bool has_twin = false;
+  std::vector<BenchmarkedSequence> by_mode;
+  std::vector<BenchmarkedSequence> twin_by_mode;
+  std::string figure;  ///< the trajectories; relative to the benchmark's folder, empty if there is none
+};
+
+struct DynamicReport {
+  std::string version;    ///< of the program
+  std::string processor;  ///< its model
+  unsigned cores = 0;
+  int runs = 0;  ///< of each sequence in each mode, as asked for
+  bool is_interrupted = false;
+  BenchmarkSettings settings;      ///< but for its mode of removal
+  std::vector<std::string> modes;  ///< names of removal_modes()
+  std::vector<DynamicResult> results;
+  std::string bars;  ///< the bar chart; relative to the benchmark's folder, empty if there is nothing to draw
+};
+
+/// A mode with the system that it stands for.
+std::string title_of_mode(const std::string& mode);
+
+/// Median error of the mode of that number in metres; NaN if it is not known.
+double ate_in(const std::vector<BenchmarkedSequence>& results, std::size_t mode);
+
+// Neither holds a date: two reports differ where results do. Medians are over complete runs.
+std::string dynamic_markdown(const DynamicReport& report);
+std::string dynamic_json(const DynamicReport& report);
+
+/// Only the table of errors.
+std::string dynamic_summary(const DynamicReport& report);
+
+/// Errors by sequence and mode (CV_8UC3); empty if none is known.
+cv::Mat dynamic_bars(const DynamicReport& report);
+
+}  // namespace roslam::app

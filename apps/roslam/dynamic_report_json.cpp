@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "apps/roslam/benchmark_metrics.hpp"
+#include "apps/roslam/dynamic_report.hpp"
+#include "roslam/evaluation/bar_chart.hpp"
+
+namespace roslam::app {
+
+namespace {
+using Json = nlohmann::ordered_json;
+
+Json by_mode(const DynamicReport& report, const std::vector<BenchmarkedSequence>& results) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < results.size(); ++i) json[report.modes[i]] = json_of(results[i]);
+  return json;
+}
+}  // namespace
+
+// What the modes stand for in the tables of the paper.
+std::string title_of_mode(const std::string& mode) {
+  if (mode == "none") return "none (ORB-SLAM2-like)";
+  if (mode == "both") return "both (RO-SLAM)";
+  return mode;
+}
+
+double ate_in(const std::vector<BenchmarkedSequence>& results, std::size_t mode) {
+  return mode < results.size() ? median_of(results[mode], ate_of) : std::numeric_limits<double>::quiet_NaN();
+}
+
+cv::Mat dynamic_bars(const DynamicReport& report) {
+  BarChart chart;
+  chart.title = "Error of the trajectory by what is removed";
+  chart.value_label = "ATE RMSE [m], logarithmic";
+  for (const auto& mode : report.modes) chart.series.push_back(title_of_mode(mode));
+  bool has_any = false;
+  const auto add = [&](const std::string& name, const std::vector<BenchmarkedSequence>& results) {
+    BarGroup group{name, {}};
+    for (std::size_t i = 0; i < report.modes.size(); ++i) group.values.push_back(ate_in(results, i));
+    has_any |=
+        std::any_of(group.values.begin(), group.values.end(), [](double v) { return std::isfinite(v); });
+    chart.groups.push_back(std::move(group));
+  };
+  for (const auto& result : report.results) {
+    add(result.sequence.name, result.by_mode);
+    if (result.has_twin) add("nothing moving", result.twin_by_mode);
+  }
+  return has_any ? draw_bar_chart(chart) : cv::Mat();
+}
+
+std::string dynamic_json(const DynamicReport& report) {
+  const BenchmarkSettings& settings = report.settings;
+  Json json{
+      {"benchmark", "dynamic"},
+      {"version", report.version},
+      {"machine", {{"processor", report.processor}, {"cores", report.cores}}},
+      {"mode", name_of(settings.mode)},
+      {"runs", report.runs},
+      {"interrupted", report.is_interrupted},
+      {"simulation", {{"traffic", settings.traffic}, {"frames", settings.frames}, {"seed", settings.seed}}}};
+  json["config"] = settings.config.empty() ? Json(nullptr) : Json(settings.config);
+  json["removal_modes"] = report.modes;
+  json["bars"] = report.bars.empty() ? Json(nullptr) : Json(report.bars);
+  json["sequences"] = Json::array();
+  for (const auto& result : report.results) {
+    Json sequence{{"name", result.sequence.name}};
+    sequence["figure"] = result.figure.empty() ? Json(nullptr) : Json(result.figure);
+    sequence["by_mode"] = by_mode(report, result.by_mode);
+    sequence["nothing_moving"] = result.has_twin ? by_mode(report, result.twin_by_mode) : Json(nullptr);
+    json["sequences"].push_back(std::move(sequence));
+  }
+  // Names of files may hold any byte; one that is not UTF-8 shall not cost the report.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace roslam::app
