@@ -134,10 +134,15 @@ TEST_F(BenchmarkDynamic, RunsTheFramesThatAComposedSequenceWasMadeOf) {
             content(folder_ / "alone/trajectory.txt"));
   EXPECT_NE(with["median"]["landmarks"], without["median"]["landmarks"]);
   // A twin that is named goes before.
-  const auto named =
-      roslam("benchmark dynamic --sequences made --twins base --modes none --runs 1 --out named --json");
+  const auto named = roslam(
+      "benchmark dynamic --sequences made made --twins base base --modes none --runs 1 --out named --json");
   ASSERT_EQ(named.code, 0) << named.error;
-  EXPECT_EQ(json::parse(named.out)["sequences"][0]["nothing_moving"]["none"]["source"], "base");
+  const json both = json::parse(named.out)["sequences"];
+  EXPECT_EQ(both[0]["nothing_moving"]["none"]["source"], "base");
+  // The same twin is not run twice.
+  EXPECT_EQ(both[0]["nothing_moving"], both[1]["nothing_moving"]);
+  EXPECT_FALSE(fs::exists(folder_ / "named/runs/made_2-still-none-1"));
+  EXPECT_TRUE(fs::exists(folder_ / "named/runs/made_2-none-1"));
 }
 
 TEST_F(BenchmarkDynamic, ExitsWithOneLineOnBadInput) {

@@ -75,9 +75,22 @@ void write_report(DynamicReport& report, const fs::path& out) {
   write_file(out / "benchmark.json", dynamic_json(report));
 }
 
+// Sequences composed from one recording share its frames as their twin: those are run once.
+std::vector<BenchmarkedSequence> known_runs(const DynamicReport& report, const BenchmarkSequence& twin) {
+  if (twin.is_simulated()) return {};
+  for (const auto& result : report.results) {
+    if (result.twin_by_mode.size() != report.modes.size()) continue;
+    const BenchmarkSequence& known = result.twin_by_mode.front().sequence;
+    if (known.source == twin.source && known.camera == twin.camera) return result.twin_by_mode;
+  }
+  return {};
+}
+
 void measure_modes(const DynamicSequence& pair, const BenchmarkArguments& arguments, DynamicReport& report,
                    const std::stop_token& stop) {
-  report.results.push_back({pair.sequence, pair.twin.has_value(), {}, {}, ""});
+  auto twin_runs = pair.twin ? known_runs(report, *pair.twin) : std::vector<BenchmarkedSequence>{};
+  const bool runs_twin = pair.twin && twin_runs.empty();
+  report.results.push_back({pair.sequence, pair.twin.has_value(), {}, std::move(twin_runs), ""});
   DynamicResult& result = report.results.back();
   for (const auto& mode : report.modes) {
     BenchmarkSettings settings = arguments.settings;
@@ -89,7 +102,7 @@ void measure_modes(const DynamicSequence& pair, const BenchmarkArguments& argume
       write_report(report, arguments.out);
     };
     add(pair.sequence, result.by_mode);
-    if (pair.twin) {
+    if (runs_twin) {
       settings.traffic = "none";
       add(*pair.twin, result.twin_by_mode);
     }
