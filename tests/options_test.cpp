@@ -86,6 +86,24 @@ TEST_F(OptionsFile, EveryFieldSurvivesWritingAndReading) {
   EXPECT_GE(differing, fields - 3);  // a few have room for no other value
 }
 
+TEST(OptionsJson, EveryFieldSurvivesWritingAndReading) {
+  const Options options = altered();
+  EXPECT_EQ(options_to_json(options_from_json(options_to_json(options))), options_to_json(options));
+  EXPECT_NE(options_to_json(options), options_to_json(Options{}));
+}
+
+TEST(OptionsJson, OtherVersionsAreReadAsFarAsKnown) {
+  const Options options = options_from_json(R"({"orb": {"features": 500, "colour": "red"}, "later": 3})");
+  EXPECT_EQ(options.orb.features, 500);
+  EXPECT_EQ(options.orb.levels, OrbOptions().levels);
+  for (const char* bad : {"", "{", "3", "[]", R"({"orb": 3})", R"({"orb": {"features": "many"}})",
+                          R"({"orb": {"features": 3}})", R"({"orb": {"features": 500.5}})",
+                          R"({"orb": {"features": 99999999999}})", R"({"orb": {"features": 1e300}})",
+                          R"({"orb": {"scale_factor": null}})", R"({"removal": {"labels": 1}})"}) {
+    EXPECT_THROW(options_from_json(bad), OptionsError) << bad;
+  }
+}
+
 TEST_F(OptionsFile, NamesAreUnique) {
   std::set<std::string> names;
   int fields = 0;

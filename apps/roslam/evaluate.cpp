@@ -10,6 +10,7 @@ void add_evaluate_command(CLI::App& program) {
   evaluate->require_subcommand(1);
   add_evaluate_trajectory_command(*evaluate);
   add_evaluate_segmentation_command(*evaluate);
+  add_evaluate_removal_command(*evaluate);
 }
 
 }  // namespace roslam::app

@@ -8,5 +8,6 @@ namespace roslam::app {
 // Each adds one kind of evaluation to `roslam evaluate`; a file of its own holds each.
 void add_evaluate_trajectory_command(CLI::App& evaluate);
 void add_evaluate_segmentation_command(CLI::App& evaluate);
+void add_evaluate_removal_command(CLI::App& evaluate);
 
 }  // namespace roslam::app

@@ -165,11 +165,7 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "RUN then holds trajectory.txt and keyframes.txt (TUM format), map.ply, trajectory.png and run.json.\n"
       "Ctrl-C ends the run early and writes what was computed so far (exit code 0, \"interrupted\" in "
       "run.json).");
-  command->add_option("SOURCE", arguments->source.name,
-                      "A folder in TUM RGB-D format, or simulated:street, simulated:loop, simulated:hover, "
-                      "simulated:turn");
-  command->add_option("--camera", arguments->source.camera,
-                      "A preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file");
+  add_source_options(*command, arguments->source);
   command->add_option("--out", arguments->out,
                       "Folder the results are written to; made if it does not exist");
   command->add_option("--config", arguments->config, "YAML file with options; --print-config shows them all");
@@ -192,15 +188,7 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command->add_option(
       "--model", arguments->model,
       "Weights of the network that labels (ONNX), in place of those that come with the program");
-  command->add_option("--traffic", arguments->source.traffic, "Of a simulated flight: none, light or heavy")
-      ->check(CLI::IsMember({"none", "light", "heavy"}))
-      ->capture_default_str();
-  command->add_option("--frames", arguments->source.frames, "Of a simulated flight; 0 = all")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  command->add_option("--seed", arguments->source.seed, "Of a simulated flight")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+  add_flight_options(*command, arguments->source);
   command->add_flag("--print-config", arguments->print_config, "Print the effective options and stop");
   command->add_flag("--video", arguments->video,
                     "Write removal.avi too: each frame with what was kept and what was removed");

@@ -2,17 +2,40 @@
 #include "apps/roslam/sources.hpp"
 
 #include <string>
+#include <string_view>
 
 #include "roslam/error.hpp"
 #include "roslam/sources/simulated_source.hpp"
-#include "roslam/sources/tum_source.hpp"
 
 namespace roslam::app {
 
 namespace {
 constexpr std::string_view kSimulated = "simulated:";
+}  // namespace
 
-std::unique_ptr<FrameSource> open_simulation(const SourceArguments& arguments) {
+CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
+  CLI::Option* source = command.add_option("SOURCE", arguments.name,
+                                           "A folder in TUM RGB-D format, or simulated:street, "
+                                           "simulated:loop, simulated:hover, simulated:turn");
+  command.add_option("--camera", arguments.camera,
+                     "A preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file");
+  return source;
+}
+
+void add_flight_options(CLI::App& command, SourceArguments& arguments) {
+  command.add_option("--traffic", arguments.traffic, "Of a simulated flight: none, light or heavy")
+      ->check(CLI::IsMember({"none", "light", "heavy"}))
+      ->capture_default_str();
+  command.add_option("--frames", arguments.frames, "Of a simulated flight; 0 = all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command.add_option("--seed", arguments.seed, "Of a simulated flight")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+}
+
+std::optional<SimulatorOptions> simulated_flight(const SourceArguments& arguments) {
+  if (!arguments.name.starts_with(kSimulated)) return std::nullopt;
   const auto path = flight_path_from(arguments.name.substr(kSimulated.size()));
   const auto traffic = traffic_level_from(arguments.traffic);
   if (!path)
@@ -27,12 +50,10 @@ std::unique_ptr<FrameSource> open_simulation(const SourceArguments& arguments) {
   options.traffic = *traffic;
   options.frames = arguments.frames;
   options.seed = arguments.seed;
-  return std::make_unique<SimulatedSource>(options);
+  return options;
 }
-}  // namespace
 
-std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
-  if (arguments.name.starts_with(kSimulated)) return open_simulation(arguments);
+std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments) {
   if (arguments.camera.empty()) {
     throw InputError(arguments.name +
                      ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a file");
@@ -42,6 +63,11 @@ std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
                      ": is for a simulated flight only; leave it out with a recording");
   }
   return std::make_unique<TumSource>(arguments.name, load_camera(arguments.camera));
+}
+
+std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
+  if (const auto flight = simulated_flight(arguments)) return std::make_unique<SimulatedSource>(*flight);
+  return open_recording(arguments);
 }
 
 }  // namespace roslam::app

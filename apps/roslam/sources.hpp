@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "roslam/sources/frame_source.hpp"
+#include "roslam/sources/simulated_options.hpp"
+#include "roslam/sources/tum_source.hpp"
 
 namespace roslam::app {
 
@@ -18,7 +22,17 @@ struct SourceArguments {
   std::uint32_t seed = 1;         ///< of a simulation
 };
 
+/// Adds SOURCE and --camera to a command; the result is SOURCE.
+CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments);
+
+/// Adds --traffic, --frames and --seed.
+void add_flight_options(CLI::App& command, SourceArguments& arguments);
+
 /// Opens what the user named. Throws InputError or CalibrationError.
 std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments);
+
+/// The two kinds of sources. The flight is empty if the user named a recording. Both throw as open_source.
+std::optional<SimulatorOptions> simulated_flight(const SourceArguments& arguments);
+std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments);
 
 }  // namespace roslam::app

@@ -173,16 +173,18 @@ std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyram
   return all;
 }
 
+cv::Mat OrbExtractor::forbidden(const cv::Mat& mask) const {
+  const int side = 2 * options_.mask_margin + 1;
+  cv::Mat wider;
+  cv::dilate(mask, wider, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
+  return wider;
+}
+
 std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat& mask,
                                               std::vector<cv::Point2f>* removed) const {
   if (grey.empty() || grey.type() != CV_8UC1) throw InputError("ORB extraction needs an 8-bit grey image");
   if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
     throw InputError("the mask of ORB extraction must be an 8-bit image of the size of the picture");
-  }
-  cv::Mat forbidden;
-  if (!mask.empty()) {
-    const int side = 2 * options_.mask_margin + 1;
-    cv::dilate(mask, forbidden, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
   }
   std::vector<cv::Mat> pyramid{grey};
   for (std::size_t level = 1; level < scales_.size(); ++level) {
@@ -192,7 +194,7 @@ std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat
     cv::resize(pyramid.back(), smaller, size, 0, 0, cv::INTER_LINEAR);
     pyramid.push_back(smaller);
   }
-  std::vector<cv::KeyPoint> points = detect(pyramid, forbidden, removed);
+  std::vector<cv::KeyPoint> points = detect(pyramid, mask.empty() ? mask : forbidden(mask), removed);
   cv::Mat descriptors;
   if (!points.empty()) describer_->compute(grey, points, descriptors);
   std::vector<OrbFeature> features(points.size());

@@ -46,6 +46,9 @@ class OrbExtractor {
   std::vector<OrbFeature> extract(const cv::Mat& grey, const cv::Mat& mask = {},
                                   std::vector<cv::Point2f>* removed = nullptr) const;
 
+  /// Where a mask lets no point be: the mask with mask_margin around it. CV_8UC1.
+  cv::Mat forbidden(const cv::Mat& mask) const;
+
   const OrbOptions& options() const { return options_; }
   int levels() const { return options_.levels; }
 

@@ -67,4 +67,9 @@ std::string options_to_yaml(const Options& options);
 /// The effective options as a JSON object.
 std::string options_to_json(const Options& options);
 
+/// Reads back what options_to_json wrote, perhaps in another version: keys it lacks keep their default, those
+/// it has beyond ours are passed over. Throws OptionsError if the text is no JSON object of sections or a
+/// value is of the wrong type or out of range.
+Options options_from_json(const std::string& text);
+
 }  // namespace roslam

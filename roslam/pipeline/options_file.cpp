@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -62,6 +63,25 @@ void reject_unknown_keys(const std::filesystem::path& file, const YAML::Node& ro
     }
   }
 }
+
+// False if a JSON value is not of a field's type.
+bool take(const nlohmann::json& value, bool& field) {
+  if (value.is_boolean()) field = value.get<bool>();
+  return value.is_boolean();
+}
+
+bool take(const nlohmann::json& value, double& field) {
+  if (value.is_number()) field = value.get<double>();
+  return value.is_number();
+}
+
+bool take(const nlohmann::json& value, int& field) {
+  using Limits = std::numeric_limits<int>;
+  const double number = value.is_number_integer() ? value.get<double>() : 2.0 * Limits::max();
+  if (number < Limits::min() || number > Limits::max()) return false;
+  field = static_cast<int>(number);
+  return true;
+}
 }  // namespace
 
 Options read_options(const std::filesystem::path& file) {
@@ -112,6 +132,24 @@ std::string options_to_json(const Options& options) {
   for_each_option(
       options, [&](const char* section, const char* key, const auto& field) { json[section][key] = field; });
   return json.dump();
+}
+
+Options options_from_json(const std::string& text) {
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  if (!json.is_object()) throw OptionsError("options are not a JSON object");
+  Options options;
+  for_each_option(options, [&](const char* section, const char* key, auto& field) {
+    const auto found = json.find(section);
+    if (found == json.end()) return;
+    if (!found->is_object()) throw OptionsError(std::string(section) + " is no section of options");
+    const auto value = found->find(key);
+    if (value == found->end()) return;
+    if (!take(*value, field)) {
+      throw OptionsError(std::string(section) + "." + key + " has a value of the wrong type");
+    }
+  });
+  options.validate();
+  return options;
 }
 
 }  // namespace roslam

@@ -2,7 +2,6 @@
 #include "roslam/pipeline/removal_log.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
@@ -19,21 +18,13 @@ namespace fs = std::filesystem;
 constexpr std::size_t kQueue = 30;         // frames that may wait to be written
 constexpr std::size_t kStripPictures = 8;  // of which twice as many are kept until the end
 constexpr const char* kFullDisk = ": cannot be written in full; check the free space on the disk";
-constexpr const char* kLines = "descriptors.jsonl";
-constexpr const char* kMasks = "masks";
 constexpr const char* kStrip = "removal.jpg";
 constexpr const char* kVideo = "removal.avi";
-
-std::string mask_name(double timestamp) {
-  char name[64];
-  std::snprintf(name, sizeof(name), "%s/%.6f.png", kMasks, timestamp);
-  return name;
-}
 }  // namespace
 
 void RemovalLog::remove_old(const fs::path& folder) {
   std::error_code error;
-  for (const char* name : {kLines, kMasks, kStrip, kVideo}) {
+  for (const char* name : {kDescriptorFile, kMaskFolder, kStrip, kVideo}) {
     fs::remove_all(folder / name, error);
     if (error) {
       throw OutputError((folder / name).string() +
@@ -44,9 +35,9 @@ void RemovalLog::remove_old(const fs::path& folder) {
 
 RemovalLog::RemovalLog(const Settings& settings) : settings_(settings) {
   remove_old(settings.folder);
-  make_folder(settings.folder / kMasks);
-  lines_.open(settings.folder / kLines, std::ios::binary);
-  if (!lines_) throw OutputError((settings.folder / kLines).string() + ": cannot open for writing");
+  make_folder(settings.folder / kMaskFolder);
+  lines_.open(settings.folder / kDescriptorFile, std::ios::binary);
+  if (!lines_) throw OutputError((settings.folder / kDescriptorFile).string() + ": cannot open for writing");
   thread_ = std::jthread([this] { work(); });
 }
 
@@ -119,7 +110,7 @@ void RemovalLog::write(const Entry& entry) {
   }
   lines_ << descriptor_line(result, entry.picture, removed, mask) << "\n";
   if (!lines_) {
-    throw OutputError((settings_.folder / kLines).string() + kFullDisk);
+    throw OutputError((settings_.folder / kDescriptorFile).string() + kFullDisk);
   }
   if (!entry.colour.empty()) write_picture(entry);
 }
@@ -155,7 +146,8 @@ void RemovalLog::finish() {
   lines_.close();
   video_.release();
   if (!failure_ && !lines_) {
-    failure_ = std::make_exception_ptr(OutputError((settings_.folder / kLines).string() + kFullDisk));
+    failure_ =
+        std::make_exception_ptr(OutputError((settings_.folder / kDescriptorFile).string() + kFullDisk));
   }
   if (failure_) {
     // On a full disk the trajectory needs the room more.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "roslam/removal/auxiliary_descriptor.hpp"
@@ -86,6 +87,12 @@ std::string descriptor_line(const FrameResult& result, const cv::Size& picture, 
   line["removed_points"] = removed;
   line["objects"] = objects;
   return line.dump();
+}
+
+std::string mask_name(double timestamp) {
+  char name[400];  // the largest double has 309 digits before the point
+  std::snprintf(name, sizeof(name), "%s/%.6f.png", kMaskFolder, timestamp);
+  return name;
 }
 
 cv::Mat object_image(const std::vector<MovableObject>& objects, const cv::Size& picture) {

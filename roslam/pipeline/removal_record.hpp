@@ -37,6 +37,13 @@ struct RemovalTally {
 std::string descriptor_line(const FrameResult& result, const cv::Size& picture, const PointCounts& removed,
                             const std::string& mask_file);
 
+/// Files of a run folder.
+inline constexpr const char* kDescriptorFile = "descriptors.jsonl";
+inline constexpr const char* kMaskFolder = "masks";
+
+/// The file of a frame's mask, relative to the run folder. Frames less than a microsecond apart share it.
+std::string mask_name(double timestamp);
+
 /// The objects of a frame in one image: CV_8UC1, 0 = none, else the position of the object in the list plus
 /// one. From the 255th on they share the number 255.
 cv::Mat object_image(const std::vector<MovableObject>& objects, const cv::Size& picture);

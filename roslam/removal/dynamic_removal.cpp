@@ -319,9 +319,7 @@ Removal DynamicRemoval::finished(const Scene& scene) {
   const int margin = settings_.removal.margin;
   removal.mask = dilated(mask, margin);
   // Only what no other thing comes near to.
-  if (cv::countNonZero(resting) > 0) {
-    removal.resting = dilated(resting, margin) & ~dilated(mask & ~resting, margin);
-  }
+  if (cv::countNonZero(resting) > 0) removal.resting = dilated_apart(resting, mask, margin);
   return removal;
 }
 

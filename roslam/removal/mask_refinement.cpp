@@ -39,6 +39,10 @@ cv::Mat dilated(const cv::Mat& mask, int pixels) {
   return result;
 }
 
+cv::Mat dilated_apart(const cv::Mat& part, const cv::Mat& mask, int pixels) {
+  return dilated(part, pixels) & ~dilated(mask & ~part, pixels);
+}
+
 cv::Mat refine_mask(const cv::Mat& mask, const cv::Mat& depth, const cv::Mat& depth_cells,
                     const cv::Mat& barrier, const CellGrid& grid, int band) {
   cv::Mat result = mask.clone();

@@ -18,4 +18,8 @@ cv::Mat refine_mask(const cv::Mat& mask, const cv::Mat& depth, const cv::Mat& de
 /// Dilates by so many pixels in every direction.
 cv::Mat dilated(const cv::Mat& mask, int pixels);
 
+/// Dilates a part of a mask by so many pixels, without what the rest of the mask, dilated as far, covers.
+/// Both CV_8UC1, 255 where set.
+cv::Mat dilated_apart(const cv::Mat& part, const cv::Mat& mask, int pixels);
+
 }  // namespace roslam

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/removal_truth.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "roslam/semantics/label_set.hpp"
+#include "roslam/sources/image_file.hpp"
+#include "roslam/sources/simulated_source.hpp"
+
+namespace roslam::app {
+
+namespace {
+namespace fs = std::filesystem;
+
+// labels: classes; empty if they are not known.
+MovingTruth truth_of(const cv::Mat& instances, const cv::Mat& labels) {
+  MovingTruth truth{instances != 0, {}};
+  if (!labels.empty()) truth.at_rest = movable_mask(labels) & ~truth.actors;
+  return truth;
+}
+
+class FlightTruth : public RemovalTruth {
+ public:
+  explicit FlightTruth(const SimulatorOptions& options) : simulator_(options) {}
+
+  std::optional<RemovalTruthFrame> next() override {
+    if (index_ >= simulator_.size()) return std::nullopt;
+    const SimulatedView view = simulator_.render(index_++);
+    return RemovalTruthFrame{view.frame.timestamp, view.frame.colour,
+                             truth_of(view.instances, view.frame.labels)};
+  }
+
+  std::size_t size() const override { return simulator_.size(); }
+
+ private:
+  Simulator simulator_;
+  std::size_t index_ = 0;
+};
+
+// What a folder of a recording knows.
+struct TruthFolder {
+  fs::path instances;  // empty: there are none
+  fs::path labels;
+  bool labels_are_classes = true;
+};
+
+std::vector<fs::path> images_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() == ".png") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// Most pixels of a picture show no actor; as a class, 0 would be road. Classes know 255 beside others, where
+// nothing is known; masks have no other value.
+bool are_actors(const std::vector<fs::path>& files) {
+  constexpr std::size_t kSample = 30;
+  std::array<std::size_t, 256> pixels{};
+  const std::size_t count = std::min(kSample, files.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const cv::Mat labels = read_label_image(files[i * files.size() / count]).image;
+    std::for_each(labels.begin<std::uint8_t>(), labels.end<std::uint8_t>(),
+                  [&](std::uint8_t value) { ++pixels[value]; });
+  }
+  const std::size_t other = std::accumulate(pixels.begin() + 1, pixels.end() - 1, std::size_t{0});
+  const std::size_t most = pixels.back();
+  return pixels.front() > other + most && (most == 0 || other == 0);
+}
+
+std::optional<TruthFolder> find_truth(const fs::path& folder) {
+  TruthFolder truth;
+  // What roslam segment labelled, which writes labels.json beside, is no truth.
+  const auto labels =
+      fs::exists(folder / "labels/labels.json") ? std::vector<fs::path>{} : images_in(folder / "labels");
+  if (!labels.empty()) truth.labels = folder / "labels";
+  if (!images_in(folder / "instances").empty()) {
+    truth.instances = folder / "instances";
+  } else if (labels.empty()) {
+    return std::nullopt;
+  } else {
+    truth.labels_are_classes = !are_actors(labels);
+  }
+  return truth;
+}
+
+class RecordedTruth : public RemovalTruth {
+ public:
+  RecordedTruth(std::unique_ptr<TumSource> source, TruthFolder folder)
+      : source_(std::move(source)), folder_(std::move(folder)) {}
+
+  std::optional<RemovalTruthFrame> next() override {
+    const auto frame = source_->next();
+    if (!frame) return std::nullopt;
+    const std::string name = source_->colour_file(frame->index).stem().string() + ".png";
+    std::optional<MovingTruth> truth = read(name);
+    if (truth && truth->actors.size() != frame->colour.size()) truth.reset();
+    return RemovalTruthFrame{frame->timestamp, frame->colour, truth};
+  }
+
+  std::size_t size() const override { return source_->size().value_or(0); }
+  std::map<std::string, std::size_t> skipped() const override { return source_->skipped(); }
+
+ private:
+  // What cannot be read or does not fit is nothing.
+  std::optional<MovingTruth> read(const std::string& name) const {
+    cv::Mat labels;
+    if (!folder_.labels.empty()) {
+      labels = read_label_image(folder_.labels / name).image;
+      if (labels.empty()) return std::nullopt;
+    }
+    if (!folder_.instances.empty()) {
+      const cv::Mat instances = read_depth_image(folder_.instances / name).image;
+      if (instances.empty() || (!labels.empty() && labels.size() != instances.size())) return std::nullopt;
+      return truth_of(instances, labels);
+    }
+    return MovingTruth{folder_.labels_are_classes ? movable_mask(labels) : cv::Mat(labels != 0), {}};
+  }
+
+  std::unique_ptr<TumSource> source_;
+  TruthFolder folder_;
+};
+}  // namespace
+
+std::unique_ptr<RemovalTruth> open_removal_truth(const SourceArguments& arguments) {
+  if (const auto flight = simulated_flight(arguments)) return std::make_unique<FlightTruth>(*flight);
+  auto recording = open_recording(arguments);
+  const auto folder = find_truth(arguments.name);
+  if (!folder) return nullptr;
+  return std::make_unique<RecordedTruth>(std::move(recording), *folder);
+}
+
+}  // namespace roslam::app

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/pipeline/recorded_removal.hpp"
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "roslam/error.hpp"
+#include "roslam/pipeline/removal_record.hpp"
+
+namespace roslam {
+
+namespace {
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+Options read_options_of_run(const fs::path& file) {
+  std::ifstream in(file);
+  if (!in || fs::is_directory(file)) {
+    throw InputError(file.string() + ": cannot open it; give the folder that roslam run wrote with --out");
+  }
+  const Json json = Json::parse(in, nullptr, false);
+  if (!json.is_object() || !json.contains("options")) {
+    throw InputError(file.string() + ": holds no options of a run, it is damaged; repeat the run");
+  }
+  try {
+    return options_from_json(json["options"].dump());
+  } catch (const OptionsError& error) {
+    throw InputError(file.string() + ": " + error.what() + "; repeat the run");
+  }
+}
+
+// Throws Json::exception for what is no whole number from 0.
+std::size_t count_from(const Json& value) { return value.get_ref<const Json::number_unsigned_t&>(); }
+
+struct Line {
+  double timestamp = 0.0;
+  RecordedFrame frame;
+};
+
+// Throws Json::exception for what descriptor_line() cannot have written.
+Line parse(const std::string& text, const fs::path& folder) {
+  const Json json = Json::parse(text);
+  Line line;
+  json.at("timestamp").get_to(line.timestamp);
+  if (const Json& mask = json.at("mask"); !mask.is_null()) line.frame.mask = folder / mask.get<std::string>();
+  line.frame.kept_points = count_from(json.at("kept_points"));
+  for (const auto& count : json.at("removed_points")) line.frame.removed_points += count_from(count);
+  std::set<std::size_t> moving;
+  for (const auto& object : json.at("objects")) {
+    const bool rests = object.at("at_rest").get<bool>();
+    (rests ? line.frame.resting : moving).insert(count_from(object.at("value")));
+    line.frame.has_objects = true;
+  }
+  for (const std::size_t value : moving)
+    line.frame.resting.erase(value);  // the last value can be that of several
+  return line;
+}
+}  // namespace
+
+RecordedRemoval::RecordedRemoval(const fs::path& run_folder)
+    : folder_(run_folder), options_(read_options_of_run(run_folder / "run.json")) {
+  if (!has_frames()) return;
+  const fs::path file = folder_ / kDescriptorFile;
+  std::ifstream in(file);
+  if (!in || fs::is_directory(file)) {
+    throw InputError(file.string() +
+                     ": cannot open it, though the run removed what moves; repeat the run with --out");
+  }
+  std::string text;
+  for (std::size_t number = 1; std::getline(in, text); ++number) {
+    try {
+      Line line = parse(text, folder_);
+      frames_.insert_or_assign(mask_name(line.timestamp), std::move(line.frame));
+    } catch (const Json::exception&) {
+      throw InputError(file.string() + ":" + std::to_string(number) +
+                       ": is no line of what was removed from a frame; repeat the run");
+    }
+  }
+}
+
+const RecordedFrame* RecordedRemoval::find(double timestamp) const {
+  const auto found = frames_.find(mask_name(timestamp));
+  return found == frames_.end() ? nullptr : &found->second;
+}
+
+}  // namespace roslam
