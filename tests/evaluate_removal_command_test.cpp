@@ -179,6 +179,7 @@ TEST_F(EvaluateRemoval, LeavesOutFramesAndCountsThem) {
   run_slam();
   fs::resize_file(some_mask(), fs::file_size(some_mask()) / 2);
   EXPECT_EQ(figures()["frames"], json({{"compared", kFrames - 1},
+                                       {"with_mask", kFrames - 1},
                                        {"without_truth", 0},
                                        {"without_mask", 1},
                                        {"not_in_run", 0},
@@ -236,7 +237,7 @@ TEST_F(EvaluateRemoval, TellsARunOfAnotherSequence) {
     cv::RNG(i).fill(colour, cv::RNG::UNIFORM, 0, 255);
     put("sequence/rgb/" + name(i), colour);
   }
-  refuses("run: the points of 5 of 5 frames of sequence differ in number from those of the run");
+  refuses("run: 5 of 5 frames of sequence have not as many points as the run counted; give the SOURCE");
 }
 
 TEST_F(EvaluateRemoval, TellsWhatIsWrongWithTheSource) {

@@ -128,13 +128,26 @@ TEST(RemovalError, LetsRestingThingsThroughWhereTheRunDid) {
   const MovingTruth truth{columns(0, 101), {}};
   const cv::Mat mask = columns(0, 60) | columns(200, 240);
   const cv::Mat resting = columns(200, 240);
-  EXPECT_EQ(compared(truth, {mask, resting, PointTally{81, 36}}).beyond, (PointTally{54, 18}));
-  EXPECT_EQ(compared(truth, {mask, resting, PointTally{99, 18}}).beyond, (PointTally{72, 0}));
-  EXPECT_EQ(compared(truth, {mask, resting, PointTally{99, 18}}).unlike_run, 0u);
+  EXPECT_EQ(compared(truth, {mask, resting, CountedPoints{81, 36, 0}}).beyond, (PointTally{54, 18}));
+  EXPECT_EQ(compared(truth, {mask, resting, CountedPoints{99, 18, 0}}).beyond, (PointTally{72, 0}));
+  EXPECT_EQ(compared(truth, {mask, resting, CountedPoints{99, 18, 0}}).unlike_run, 0u);
   EXPECT_EQ(compared(truth, {mask, resting, {}}).beyond, (PointTally{54, 18}));
-  EXPECT_EQ(compared(truth, {mask, resting, PointTally{80, 30}}).beyond, (PointTally{54, 18}));
-  EXPECT_EQ(compared(truth, {mask, resting, PointTally{80, 30}}).unlike_run, 1u);
-  EXPECT_EQ(compared(truth, {{}, {}, PointTally{116, 0}}).unlike_run, 1u);
+  EXPECT_EQ(compared(truth, {mask, resting, CountedPoints{80, 30, 0}}).beyond, (PointTally{54, 18}));
+  EXPECT_EQ(compared(truth, {mask, resting, CountedPoints{80, 30, 0}}).unlike_run, 1u);
+  EXPECT_EQ(compared(truth, {{}, {}, CountedPoints{116, 0, 0}}).unlike_run, 1u);
+}
+
+// Extraction keeps some pixels off a mask; how many corners it removes there tells pictures apart that have
+// as many points as the budget allows.
+TEST(RemovalError, KnowsTheRunByItsPointsBesideTheMask) {
+  OrbOptions options = exact();
+  options.mask_margin = 12;  // pixels: from 60 to the dots at 70
+  RemovalComparison comparison(options, 0);
+  comparison.add(dots(), {nothing(), {}}, {columns(0, 61), {}, CountedPoints{90, 27, 9}});
+  EXPECT_EQ(comparison.error().unlike_run, 0u);
+  comparison.add(dots(), {nothing(), {}}, {columns(0, 61), {}, CountedPoints{90, 27, 8}});
+  EXPECT_EQ(comparison.error().unlike_run, 1u);
+  EXPECT_EQ(comparison.error().with_mask, 2u);
 }
 
 TEST(RemovalError, RefusesWhatDoesNotFit) {

@@ -85,7 +85,12 @@ struct RemovalComparison::Extraction {
   std::vector<OrbFeature> kept;
   std::vector<cv::Point2f> removed;
 
-  PointTally tally() const { return {kept.size(), removed.size()}; }
+  // whole: the dilated mask of all that was removed.
+  CountedPoints counted(const cv::Mat& whole) const {
+    const auto is_beside = [&](const cv::Point2f& point) { return value_at(whole, point) == 0; };
+    const auto beside = std::count_if(removed.begin(), removed.end(), is_beside);
+    return {kept.size(), removed.size(), static_cast<std::size_t>(beside)};
+  }
 };
 
 RemovalComparison::RemovalComparison(const OrbOptions& orb, int margin) : extractor_(orb), margin_(margin) {
@@ -102,10 +107,10 @@ RemovalComparison::Extraction RemovalComparison::extract_as_run(const cv::Mat& g
                                                                 const RemovedThings& run) {
   const cv::Mat mask = run.mask.empty() ? cv::Mat() : dilated(run.mask != 0, margin_);
   Extraction points = extract(grey, mask);
-  if (!run.points || points.tally() == *run.points) return points;
+  if (!run.points || points.counted(mask) == *run.points) return points;
   if (!mask.empty() && !run.resting.empty()) {
     Extraction lenient = extract(grey, mask & ~dilated_apart(run.resting != 0, run.mask != 0, margin_));
-    if (lenient.tally() == *run.points) return lenient;
+    if (lenient.counted(mask) == *run.points) return lenient;
   }
   ++error_.unlike_run;
   return points;
@@ -132,6 +137,7 @@ void RemovalComparison::add(const cv::Mat& grey, const MovingTruth& truth, const
   error_.pixels += grey.total();
   error_.actor_pixels += count(truth.actors);
   if (is_masked) {
+    ++error_.with_mask;
     error_.removed_pixels += count(points.mask);
     error_.removed_actor_pixels += count(points.mask & (truth.actors != 0));
   }

@@ -44,10 +44,11 @@ struct RemovalError {
   std::uint64_t removed_actor_pixels = 0;  ///< of the actors' under that mask
 
   std::size_t frames = 0;         ///< compared
+  std::size_t with_mask = 0;      ///< frames compared of which the run removed something
   std::size_t without_truth = 0;  ///< frames left out: the true mask is missing or unusable
   std::size_t without_mask = 0;   ///< frames left out: the mask of the run is missing or unusable
   std::size_t not_in_run = 0;     ///< frames left out: the run dropped or never reached them
-  std::size_t unlike_run = 0;     ///< frames compared whose points differ in number from those of the run
+  std::size_t unlike_run = 0;     ///< frames compared whose points are not as many as the run counted
   bool interrupted = false;       ///< frames are missing at the end
 
   PointTally on_static_scene() const;
@@ -64,11 +65,21 @@ struct MovingTruth {
   cv::Mat at_rest;  ///< CV_8UC1, nonzero on what can move but rests; empty = nothing
 };
 
+/// How many points a run counted in a frame.
+struct CountedPoints {
+  std::size_t kept = 0;
+  std::size_t removed = 0;
+  std::size_t beside =
+      0;  ///< of those removed, next to the dilated mask: extraction keeps some pixels off it
+
+  bool operator==(const CountedPoints&) const = default;
+};
+
 /// What a run removed from a frame, before dilation.
 struct RemovedThings {
   cv::Mat mask;     ///< CV_8UC1, nonzero on what was removed; empty = nothing
   cv::Mat resting;  ///< CV_8UC1, the part of mask that the run took to be at rest; empty = nothing
-  std::optional<PointTally> points;  ///< as the run counted them: those it had and the corners it removed
+  std::optional<CountedPoints> points;  ///< if they are known
 };
 
 /// Extracts the points of frames once more, without a mask and under that of a run, and counts what they lie

@@ -35,7 +35,7 @@ std::string left_out(const RemovalError& error) {
   tell(error.without_truth, "left out: their true mask is missing or unusable");
   tell(error.without_mask, "left out: their mask in the run is missing or unusable");
   tell(error.not_in_run, "left out: the run did not process them");
-  tell(error.unlike_run, "compared although their points differ in number from those of the run");
+  tell(error.unlike_run, "compared although their points are not as many as the run counted");
   return text.empty() ? text : "\n" + text;
 }
 }  // namespace
@@ -77,6 +77,7 @@ std::string to_json(const RemovalError& error) {
                   {"removed_pixel_share", number(error.removed_share())},
                   {"frames",
                    {{"compared", error.frames},
+                    {"with_mask", error.with_mask},
                     {"without_truth", error.without_truth},
                     {"without_mask", error.without_mask},
                     {"not_in_run", error.not_in_run},

@@ -44,8 +44,12 @@ Line parse(const std::string& text, const fs::path& folder) {
   Line line;
   json.at("timestamp").get_to(line.timestamp);
   if (const Json& mask = json.at("mask"); !mask.is_null()) line.frame.mask = folder / mask.get<std::string>();
-  line.frame.kept_points = count_from(json.at("kept_points"));
-  for (const auto& count : json.at("removed_points")) line.frame.removed_points += count_from(count);
+  CountedPoints& points = line.frame.points;
+  points.kept = count_from(json.at("kept_points"));
+  for (const auto& [kind, count] : json.at("removed_points").items()) {
+    points.removed += count_from(count);
+    if (kind == kBesideMask) points.beside = count_from(count);
+  }
   std::set<std::size_t> moving;
   for (const auto& object : json.at("objects")) {
     const bool rests = object.at("at_rest").get<bool>();

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "roslam/evaluation/removal_error.hpp"
 #include "roslam/pipeline/options.hpp"
 
 namespace roslam {
@@ -16,8 +17,7 @@ struct RecordedFrame {
   std::filesystem::path mask;     ///< as object_image() makes it; empty if there is none
   bool has_objects = false;       ///< things were removed; without a mask, it was dropped
   std::set<std::size_t> resting;  ///< values in the mask of things that the run took to be at rest
-  std::size_t kept_points = 0;
-  std::size_t removed_points = 0;
+  CountedPoints points;
 };
 
 /// What a run removed, read back from the folder that `roslam run` wrote.

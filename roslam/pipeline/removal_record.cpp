@@ -45,7 +45,7 @@ PointCounts removed_by_class(const FrameResult& result, const cv::Size& picture)
   for (const auto& point : result.removed_points) {
     const Movable kind = kind_at(kinds, point);
     // Extraction keeps some pixels off the mask, where no class is drawn.
-    ++counts[kind == Movable::kNone ? "margin" : std::string(name_of(kind))];
+    ++counts[kind == Movable::kNone ? kBesideMask : std::string(name_of(kind))];
   }
   return counts;
 }

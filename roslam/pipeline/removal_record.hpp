@@ -11,8 +11,9 @@
 
 namespace roslam {
 
-/// How many points, by the class of what they lie on; "margin" is what lies beside it.
+/// How many points, by the class of what they lie on; kBesideMask is what lies beside it.
 using PointCounts = std::map<std::string, std::size_t>;
+inline constexpr const char* kBesideMask = "margin";
 
 /// What the points that were removed from a frame lay on.
 PointCounts removed_by_class(const FrameResult& result, const cv::Size& picture);
