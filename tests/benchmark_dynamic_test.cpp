@@ -57,6 +57,9 @@ TEST_F(BenchmarkDynamic, RunsEveryModeWithAndWithoutTraffic) {
         content(folder_ / ("results/runs/simulated-street-" + std::string(mode) + "-1/run.json")));
     EXPECT_EQ(run["dynamic"]["mode"], mode);
   }
+  EXPECT_FALSE(sequence["removal"].contains("none"));
+  ASSERT_TRUE(sequence["removal"].contains("both")) << result.error;
+  EXPECT_EQ(sequence["removal"]["both"]["frames"], 5);
   // The same flight, but what drives and walks through it.
   const json still = json::parse(content(folder_ / "results/runs/simulated-street-still-none-1/run.json"));
   EXPECT_EQ(still["frames"]["in_source"], 5);
@@ -70,7 +73,7 @@ TEST_F(BenchmarkDynamic, WritesTablesAndCharts) {
   const std::string markdown = content(folder_ / "results/benchmark.md");
   for (const char* words : {"none (ORB-SLAM2-like)", "both (RO-SLAM)", "| simulated-street ",
                             "- nothing moving", "table 3 of the paper", "table 5 of the paper", "137.96",
-                            "](bars.png)", "](simulated-street.png)", "times the error"}) {
+                            "](bars.png)", "on actors, kept", "](simulated-street.png)", "times the error"}) {
     EXPECT_NE(markdown.find(words), std::string::npos) << words << " is not in\n" << markdown;
   }
   EXPECT_EQ(markdown.find("| ds-slam-like"), std::string::npos) << "a mode that was not asked for";

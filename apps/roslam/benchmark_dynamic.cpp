@@ -12,6 +12,8 @@
 #include "apps/roslam/dynamic_report.hpp"
 #include "apps/roslam/interrupt.hpp"
 #include "apps/roslam/output.hpp"
+#include "apps/roslam/removal_evaluation.hpp"
+#include "apps/roslam/sources.hpp"
 #include "roslam/error.hpp"
 #include "roslam/evaluation/trajectory_plot.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
@@ -75,6 +77,27 @@ void write_report(DynamicReport& report, const fs::path& out) {
   write_file(out / "benchmark.json", dynamic_json(report));
 }
 
+// Nothing where the truth does not tell what moves, or nothing was to be removed.
+std::optional<RemovalError> removal_of(const BenchmarkedSequence& measured, const BenchmarkSettings& settings,
+                                       const BenchmarkArguments& arguments, const std::stop_token& stop) {
+  const auto runs = measured.complete_runs();
+  if (runs.empty() || settings.dynamic == "none") return std::nullopt;
+  const BenchmarkSequence& sequence = measured.sequence;
+  SourceArguments source{sequence.source, sequence.camera};
+  if (sequence.is_simulated()) {
+    source.traffic = settings.traffic;
+    source.frames = settings.frames;
+    source.seed = settings.seed;
+  }
+  try {
+    return evaluate_removal_of_run(source, fs::path(arguments.out) / runs.front()->folder, {stop, true});
+  } catch (const InputError& error) {
+    std::fprintf(stderr, "note: %s: what was removed cannot be told: %s\n", sequence.name.c_str(),
+                 error.what());
+    return std::nullopt;
+  }
+}
+
 // Sequences composed from one recording share its frames as their twin: those are run once.
 std::vector<BenchmarkedSequence> known_runs(const DynamicReport& report, const BenchmarkSequence& twin) {
   if (twin.is_simulated()) return {};
@@ -90,7 +113,7 @@ void measure_modes(const DynamicSequence& pair, const BenchmarkArguments& argume
                    const std::stop_token& stop) {
   auto twin_runs = pair.twin ? known_runs(report, *pair.twin) : std::vector<BenchmarkedSequence>{};
   const bool runs_twin = pair.twin && twin_runs.empty();
-  report.results.push_back({pair.sequence, pair.twin.has_value(), {}, std::move(twin_runs), ""});
+  report.results.push_back({pair.sequence, pair.twin.has_value(), {}, std::move(twin_runs), {}, ""});
   DynamicResult& result = report.results.back();
   for (const auto& mode : report.modes) {
     BenchmarkSettings settings = arguments.settings;
@@ -102,6 +125,8 @@ void measure_modes(const DynamicSequence& pair, const BenchmarkArguments& argume
       write_report(report, arguments.out);
     };
     add(pair.sequence, result.by_mode);
+    if (stop.stop_requested()) break;
+    result.removal.push_back(removal_of(result.by_mode.back(), settings, arguments, stop));
     if (runs_twin) {
       settings.traffic = "none";
       add(*pair.twin, result.twin_by_mode);
@@ -168,8 +193,8 @@ void add_benchmark_dynamic_command(CLI::App& benchmark, const std::string& versi
       ->capture_default_str();
   command
       ->add_option("--twins", arguments->twins,
-                   "The same sequences without what moves, one for each of --sequences, - where there is "
-                   "none; default: those that simulated and composed sequences have by nature")
+                   "The same sequences without what moves, one for each of --sequences; - and default: what "
+                   "simulated and composed sequences have by nature")
       ->type_name("DIR");
   command
       ->add_option("--tum", arguments->tum,

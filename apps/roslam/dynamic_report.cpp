@@ -19,6 +19,26 @@ constexpr double kPercent = 100.0;
 
 using Results = std::vector<BenchmarkedSequence>;
 
+constexpr auto kLegend = R"(
+- ATE: distance from the truth after the best rigid alignment, SE(3), of the whole path, root mean square. All frames
+  were tracked where no share is given.
+- nothing moving: the same frames without what moves: a simulated flight without traffic, or what a composed sequence
+  was made of.
+- none, labels, geometry, both: what finds what moves; nothing, the network, depth and optical flow, the two together.
+  ds-slam-like and dynaslam-like put the parts of RO-SLAM together in the manner of those systems, with the network of
+  RO-SLAM; they are not those systems.
+- paper: tables 3 and 5 as published, medians and means of ten runs, measured on another computer with a GPU.
+)";
+
+constexpr auto kTimesLegend = R"(
+Processor time, medians over runs and sequences. Tracking goes from the picture to its pose; the network runs beside it on
+a thread of its own, and in real time labels as many frames as it can.
+)";
+constexpr auto kRemovalLegend = R"(
+Actors are what really moves; they cover so much of the picture. Of the points on them so many were kept, and of those on
+the static scene so many removed: in all, within 10 pixels of an actor's silhouette, and beyond. Of each mode's first run.
+)";
+
 // An error over a part of the frames is marked, or losing track would look like accuracy.
 std::string error_cell(const Results& results, std::size_t mode) {
   if (mode >= results.size()) return "-";
@@ -82,6 +102,24 @@ std::string table_of_ratios(const DynamicReport& report) {
   return "\n## Against the same frames with nothing moving and nothing removed\n\n" + markdown_table(rows);
 }
 
+std::string table_of_removal(const DynamicReport& report) {
+  std::vector<TableRow> rows{{"% of ORB points", "mode", "actors cover", "on actors, kept", "static, removed",
+                              "within 10 px", "beyond"}};
+  for (const auto& result : report.results) {
+    for (std::size_t i = 0; i < result.removal.size(); ++i) {
+      if (!result.removal[i]) continue;
+      const RemovalError& error = *result.removal[i];
+      rows.push_back({table_cell(result.sequence.name), report.modes[i]});
+      for (const double share :
+           {error.actor_share(), error.on_actors.kept_share(), error.on_static_scene().removed_share(),
+            error.near_actors.removed_share(), error.beyond.removed_share()})
+        rows.back().push_back(fixed(kPercent * share, 1));
+    }
+  }
+  if (rows.size() == 1) return "";
+  return "\n## What was removed, where the truth is known\n\n" + markdown_table(rows) + kRemovalLegend;
+}
+
 double over_sequences(const DynamicReport& report, std::size_t mode,
                       const std::function<double(const BenchmarkedSequence&)>& value) {
   std::vector<double> values;
@@ -138,21 +176,6 @@ std::string remarks_of(const DynamicReport& report) {
   return text.str();
 }
 
-constexpr auto kLegend = R"(
-- ATE: distance from the truth after the best rigid alignment, SE(3), of the whole path, root mean square. All frames
-  were tracked where no share is given.
-- nothing moving: the same frames without what moves: a simulated flight without traffic, or what a composed sequence
-  was made of.
-- none, labels, geometry, both: what finds what moves; nothing, the network, depth and optical flow, the two together.
-  ds-slam-like and dynaslam-like put the parts of RO-SLAM together in the manner of those systems, with the network of
-  RO-SLAM; they are not those systems.
-- paper: tables 3 and 5 as published, medians and means of ten runs, measured on another computer with a GPU.
-)";
-
-constexpr auto kTimesLegend = R"(
-Processor time, medians over runs and sequences. Tracking goes from the picture to its pose; the network runs beside it on
-a thread of its own, and in real time labels as many frames as it can.
-)";
 }  // namespace
 
 std::string dynamic_summary(const DynamicReport& report) { return table_of_errors(report); }
@@ -166,7 +189,7 @@ std::string dynamic_markdown(const DynamicReport& report) {
   if (report.is_interrupted) text << "\n**Interrupted: sequences and runs are missing.**\n";
   text << "\n## Error of the trajectory (table 3 of the paper)\n\n" << table_of_errors(report) << kLegend;
   if (!report.bars.empty()) text << "\n![Errors by mode](" << report.bars << ")\n";
-  text << table_of_ratios(report);
+  text << table_of_ratios(report) << table_of_removal(report);
   text << "\n## Time (table 5 of the paper)\n\n" << table_of_times(report) << kTimesLegend;
   if (const std::string remarks = remarks_of(report); !remarks.empty()) text << "\n## Remarks\n" << remarks;
   for (const auto& result : report.results) {

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/roslam/benchmark_measure.hpp"
 #include "apps/roslam/dynamic_sequences.hpp"
+#include "roslam/evaluation/removal_error.hpp"
 
 namespace roslam::app {
 
@@ -17,6 +19,8 @@ struct DynamicResult {
   bool has_twin = false;
   std::vector<BenchmarkedSequence> by_mode;
   std::vector<BenchmarkedSequence> twin_by_mode;
+  /// What the first run of each mode removed; empty where the truth does not tell what moves. May be shorter.
+  std::vector<std::optional<RemovalError>> removal;
   std::string figure;  ///< the trajectories; relative to the benchmark's folder, empty if there is none
 };
 

@@ -70,6 +70,10 @@ std::string dynamic_json(const DynamicReport& report) {
     sequence["figure"] = result.figure.empty() ? Json(nullptr) : Json(result.figure);
     sequence["by_mode"] = by_mode(report, result.by_mode);
     sequence["nothing_moving"] = result.has_twin ? by_mode(report, result.twin_by_mode) : Json(nullptr);
+    sequence["removal"] = Json::object();
+    for (std::size_t i = 0; i < result.removal.size(); ++i) {
+      if (result.removal[i]) sequence["removal"][report.modes[i]] = Json::parse(to_json(*result.removal[i]));
+    }
     json["sequences"].push_back(std::move(sequence));
   }
   // Names of files may hold any byte; one that is not UTF-8 shall not cost the report.

@@ -67,9 +67,8 @@ std::optional<BenchmarkSequence> twin_of(const BenchmarkSequence& sequence, bool
   return twin_of_composed(sequence, out);
 }
 
-std::optional<BenchmarkSequence> named_twin(const std::string& argument, const BenchmarkSequence& sequence,
-                                            const std::string& camera) {
-  if (argument == "-") return std::nullopt;
+BenchmarkSequence named_twin(const std::string& argument, const BenchmarkSequence& sequence,
+                             const std::string& camera) {
   BenchmarkSequence twin = find_sequences({argument}, camera).front();
   if (twin.is_simulated()) {
     throw InputError("--twins " + argument +
@@ -103,14 +102,15 @@ std::vector<DynamicSequence> find_dynamic_sequences(const DynamicSequenceArgumen
   if (!arguments.twins.empty() && arguments.twins.size() != arguments.sequences.size()) {
     throw InputError("--twins: " + std::to_string(arguments.twins.size()) + " for " +
                      std::to_string(arguments.sequences.size()) +
-                     " --sequences; give one each, - where there is none");
+                     " --sequences; give one each, - for none of your own");
   }
   std::vector<DynamicSequence> result;
   for (auto& sequence : find_sequences(names, arguments.camera)) {
     const std::size_t index = result.size();
-    auto twin = arguments.twins.empty() || index < of_tum
-                    ? twin_of(sequence, arguments.has_traffic, out)
-                    : named_twin(arguments.twins[index - of_tum], sequence, arguments.camera);
+    const bool is_named =
+        index >= of_tum && !arguments.twins.empty() && arguments.twins[index - of_tum] != "-";
+    auto twin = is_named ? named_twin(arguments.twins[index - of_tum], sequence, arguments.camera)
+                         : twin_of(sequence, arguments.has_traffic, out);
     result.push_back({std::move(sequence), std::move(twin)});
   }
   return result;

@@ -19,7 +19,7 @@ struct DynamicSequence {
 /// What the command line names.
 struct DynamicSequenceArguments {
   std::vector<std::string> sequences;  ///< as find_sequences() takes them
-  std::vector<std::string> twins;      ///< one a sequence, "-" = none; empty = those that can be found
+  std::vector<std::string> twins;      ///< one a sequence; "-", or none at all, = what can be found
   std::string camera;                  ///< of the folders that name none
   std::string tum;                     ///< folder with sequences as scripts/get_tum leaves them; may be empty
   bool has_traffic = true;             ///< of simulated flights; one without is no twin to itself
