@@ -6,6 +6,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "roslam/geometry/median.hpp"
+
 namespace roslam {
 
 namespace {
@@ -105,7 +107,7 @@ std::vector<MovableObject> find_objects(const Segmentation& segmentation, const 
     MovableObject object;
     const int kind = cells.at<std::uint8_t>(inside.front());
     object.kind = static_cast<Movable>(kind);
-    if (!take_mask(object, grid.mask_pixels(wider) & (kinds == kind))) continue;
+    if (!take_mask(object, grid.in_pixels(wider) & (kinds == kind))) continue;
     object.confidence = object.sureness = confidence_of(object, segmentation);
     object.median_depth = median_depth(object, depth, grid);
     objects.push_back(std::move(object));
@@ -144,10 +146,7 @@ float median_depth(const MovableObject& object, const cv::Mat& depth, const Cell
       if (object.mask.at<std::uint8_t>(pixel - object.box.tl()) != 0) known.push_back(z);
     }
   }
-  if (known.empty()) return 0.0F;
-  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-  std::nth_element(known.begin(), middle, known.end());
-  return *middle;
+  return known.empty() ? 0.0F : median(known);
 }
 
 }  // namespace roslam
