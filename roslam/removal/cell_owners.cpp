@@ -48,12 +48,14 @@ void claim_cells(CellScene& scene, const std::vector<MovableObject>& objects,
   scene.seeds |= scene.owners != 0;
   const bool has_depth = options.free_space;
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    if (!is_fresh(objects[i])) claim_for(objects[i], i, has_depth ? Claim::kPlausible : Claim::kAll);
+    if (is_fresh(objects[i]) || !is_confirmed(objects[i])) continue;
+    claim_for(objects[i], i, has_depth ? Claim::kPlausible : Claim::kAll);
   }
   if (!has_depth) return;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     for (const auto& past : before) {
-      if (past.id == objects[i].id && past.is_believed) claim_for(past, i, Claim::kMoving);
+      if (past.id == objects[i].id && past.is_believed && is_confirmed(past))
+        claim_for(past, i, Claim::kMoving);
     }
   }
 }

@@ -161,6 +161,12 @@ void DynamicRemoval::weigh(CellScene& scene) {
             ? !contradicts_motion(evidence[i + 1])
             : is_sure || (object.sightings >= kConfirmed && !seems_at_rest(evidence[i + 1], options));
     if (!object.is_believed) scene.owners.setTo(0, scene.owners == number);
+    // Only what no thing owns is looked through for new ones: those known by now are seen again here.
+    const bool still_moves = evidence[i + 1].moving > 0 || evidence[i + 1].flow_moving > 0;
+    if (object.kind == Movable::kUnknown && object.is_believed && still_moves) {
+      object.last_seen = current_.timestamp;
+      object.misses = 0;
+    }
   }
 }
 
@@ -201,9 +207,8 @@ void DynamicRemoval::add_unlabelled(CellScene& scene) {
     if (const auto old = position_of(objects[i].id, old_ids)) {
       owners.setTo(number, scene.owners == static_cast<int>(*old) + 1);
     }
-    constexpr int kSightings = 2;  // once may be noise
     const auto now = position_of(objects[i].id, found_ids);
-    if (now && objects[i].sightings >= kSightings) owners.setTo(number, numbers == found_numbers[*now]);
+    if (now && is_confirmed(objects[i])) owners.setTo(number, numbers == found_numbers[*now]);
   }
   scene.owners = owners;
 }

@@ -120,18 +120,27 @@ void paint(const MovableObject& object, cv::Mat& image, int value) {
 }
 
 bool take_mask(MovableObject& object, const cv::Mat& image) {
-  object.box = cv::boundingRect(image);
-  if (object.box.empty()) return false;
+  const cv::Rect box = cv::boundingRect(image);
+  if (box.empty()) return false;
+  object.box = box;
   object.mask = image(object.box).clone();
   return true;
 }
 
-double overlap(const MovableObject& a, const MovableObject& b) {
+bool is_confirmed(const MovableObject& object) {
+  constexpr int kSightings = 2;
+  return object.kind != Movable::kUnknown || object.sightings >= kSightings;
+}
+
+int common_pixels(const MovableObject& a, const MovableObject& b) {
   const cv::Rect both = a.box & b.box;
-  if (both.empty()) return 0.0;
-  const cv::Mat common = a.mask(both - a.box.tl()) & b.mask(both - b.box.tl());
+  if (both.empty()) return 0;
+  return cv::countNonZero(a.mask(both - a.box.tl()) & b.mask(both - b.box.tl()));
+}
+
+double overlap(const MovableObject& a, const MovableObject& b) {
   const int smaller = std::min(cv::countNonZero(a.mask), cv::countNonZero(b.mask));
-  return smaller == 0 ? 0.0 : static_cast<double>(cv::countNonZero(common)) / smaller;
+  return smaller == 0 ? 0.0 : static_cast<double>(common_pixels(a, b)) / smaller;
 }
 
 float median_depth(const MovableObject& object, const cv::Mat& depth, const CellGrid& grid) {

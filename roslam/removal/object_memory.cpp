@@ -124,11 +124,12 @@ void ObjectMemory::carry(const PastFrame& last, const PastFrame& current, const 
 
 MovableObject* ObjectMemory::best_match(const MovableObject& object, const std::vector<bool>& taken) {
   MovableObject* best = nullptr;
-  double most = kSame;
+  int most = 0;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     if (taken[i]) continue;
-    const double common = overlap(objects_[i], object);
-    if (common > most) {
+    // Not the largest share: a scrap that lies within the thing would win.
+    const int common = common_pixels(objects_[i], object);
+    if (common > most && overlap(objects_[i], object) > kSame) {
       most = common;
       best = &objects_[i];
     }
@@ -185,7 +186,7 @@ std::vector<int> ObjectMemory::join_unlabelled(std::vector<MovableObject> found,
     MovableObject& object = objects_[i];
     const bool is_unlabelled = object.kind == Movable::kUnknown;
     if (is_unlabelled && (taken[i] || timestamp - object.last_seen > kKeepUnlabelled)) continue;
-    if (is_unlabelled) ++object.misses;
+    if (is_unlabelled && object.last_seen < timestamp) ++object.misses;
     joined.push_back(std::move(object));
   }
   objects_ = std::move(joined);
