@@ -9,48 +9,10 @@
 #include "roslam/error.hpp"
 #include "roslam/pipeline/run.hpp"
 #include "roslam/pipeline/slam.hpp"
-#include "tests/street.hpp"
+#include "tests/street_frames.hpp"
 
 namespace roslam::street {
 namespace {
-
-class Street : public testing::Test {
- protected:
-  static void SetUpTestSuite() { frames_ = std::make_unique<std::vector<Frame>>(frames()); }
-  static void TearDownTestSuite() { frames_.reset(); }
-
-  static Frame blank(std::size_t index, const cv::Scalar& colour) {
-    Frame frame;
-    frame.index = index;
-    frame.timestamp = time_of(index);
-    frame.colour = cv::Mat(480, 640, CV_8UC3, colour);
-    frame.depth = cv::Mat(480, 640, CV_32FC1, cv::Scalar(3.0));
-    return frame;
-  }
-
-  // Frames of the flight from begin to end, with blank ones where the flight has none or for [gap, gap_end).
-  static std::vector<Frame> with_blank(std::size_t gap, std::size_t gap_end, std::size_t end,
-                                       const cv::Scalar& colour) {
-    std::vector<Frame> sequence;
-    for (const auto& frame : *frames_) {
-      if (frame.index < gap) sequence.push_back(frame);
-    }
-    for (std::size_t i = gap; i < gap_end; ++i) sequence.push_back(blank(i, colour));
-    for (const auto& frame : *frames_) {
-      if (frame.index >= gap_end && frame.index < end) sequence.push_back(frame);
-    }
-    return sequence;
-  }
-
-  // Where the camera of a frame truly is, in the world of the first frame's estimate.
-  static SE3 truth(const Frame& frame, const SE3& first_estimate) {
-    return first_estimate * frames_->front().T_world_camera->inverse() * *frame.T_world_camera;
-  }
-
-  static std::unique_ptr<std::vector<Frame>> frames_;
-};
-
-std::unique_ptr<std::vector<Frame>> Street::frames_;
 
 struct Blank {
   const char* name;

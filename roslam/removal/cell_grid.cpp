@@ -88,7 +88,7 @@ cv::Mat CellGrid::mask_cells(const cv::Mat& mask) const {
   return cells;
 }
 
-cv::Mat CellGrid::mask_pixels(const cv::Mat& cells) const {
+cv::Mat CellGrid::in_pixels(const cv::Mat& cells) const {
   cv::Mat large;
   cv::resize(cells, large, size_ * side_, 0, 0, cv::INTER_NEAREST);
   return large(cv::Rect(0, 0, camera_.width, camera_.height)).clone();

@@ -41,8 +41,8 @@ class CellGrid {
   /// CV_8UC1: 255 for each cell whose middle is set in a mask of the picture.
   cv::Mat mask_cells(const cv::Mat& mask) const;
 
-  /// CV_8UC1 of the picture's size: 255 for each pixel of the cells that are set.
-  cv::Mat mask_pixels(const cv::Mat& cells) const;
+  /// An image of cells as one of the picture's size: each pixel has its cell's value.
+  cv::Mat in_pixels(const cv::Mat& cells) const;
 
  private:
   Camera camera_;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "roslam/removal/cell_grid.hpp"
+#include "roslam/removal/cell_owners.hpp"
 #include "roslam/removal/flow_check.hpp"
 #include "roslam/removal/free_space.hpp"
 #include "roslam/removal/movable_object.hpp"
@@ -64,17 +65,13 @@ class DynamicRemoval {
   std::size_t flickers() const { return memory_.flickers(); }
 
  private:
-  struct Scene;  // what is known of the current frame, cell by cell
-
   void begin(const Frame& frame, const cv::Mat& grey, const std::optional<SE3>& predicted_T_camera_world);
-  Scene gather_evidence() const;
-  void drop_contradicted(FreeSpaceEvidence& space, const FollowedPoints& flow) const;
+  CellScene gather_evidence() const;
+  void drop_contradicted(CellScene& scene) const;
   std::optional<std::vector<MovableObject>> usable_objects(const LabelledFrame& labels);
-  void claim(Scene& scene, const std::vector<MovableObject>& before) const;
-  void weigh(Scene& scene);
-  void add_unlabelled(Scene& scene);
-  cv::Mat owners_of_pixels(const Scene& scene) const;
-  Removal finished(const Scene& scene);
+  void weigh(CellScene& scene);
+  void add_unlabelled(CellScene& scene);
+  Removal finished(const CellScene& scene);
   const PastFrame* past_frame(std::size_t index) const;
   const PastFrame* anchor() const;
 

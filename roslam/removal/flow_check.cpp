@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "roslam/geometry/median.hpp"
+
 namespace roslam {
 
 namespace {
@@ -116,10 +118,8 @@ FollowedPoints FlowCheck::follow(const PastFrame& past, const PastFrame& current
   constexpr std::size_t kFewest = 10;
   if (errors.size() < kFewest) return {};
   // Most points are at rest, so their spread tells how good pixels and pose are in this frame.
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
   constexpr double kSigmaOfMedian = 1.1774;  // of a length in the plane, Rayleigh distribution
-  const double sigma = std::max(1.0, std::sqrt(*middle) / kSigmaOfMedian);
+  const double sigma = std::max(1.0, std::sqrt(median(errors)) / kSigmaOfMedian);
   const double limit = options_.flow_tolerance * options_.flow_tolerance;
   FollowedPoints result;
   result.sigma = sigma;

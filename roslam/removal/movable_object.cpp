@@ -6,6 +6,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "roslam/geometry/median.hpp"
+
 namespace roslam {
 
 namespace {
@@ -105,7 +107,7 @@ std::vector<MovableObject> find_objects(const Segmentation& segmentation, const 
     MovableObject object;
     const int kind = cells.at<std::uint8_t>(inside.front());
     object.kind = static_cast<Movable>(kind);
-    if (!take_mask(object, grid.mask_pixels(wider) & (kinds == kind))) continue;
+    if (!take_mask(object, grid.in_pixels(wider) & (kinds == kind))) continue;
     object.confidence = object.sureness = confidence_of(object, segmentation);
     object.median_depth = median_depth(object, depth, grid);
     objects.push_back(std::move(object));
@@ -118,18 +120,27 @@ void paint(const MovableObject& object, cv::Mat& image, int value) {
 }
 
 bool take_mask(MovableObject& object, const cv::Mat& image) {
-  object.box = cv::boundingRect(image);
-  if (object.box.empty()) return false;
+  const cv::Rect box = cv::boundingRect(image);
+  if (box.empty()) return false;
+  object.box = box;
   object.mask = image(object.box).clone();
   return true;
 }
 
-double overlap(const MovableObject& a, const MovableObject& b) {
+bool is_confirmed(const MovableObject& object) {
+  constexpr int kSightings = 2;
+  return object.kind != Movable::kUnknown || object.sightings >= kSightings;
+}
+
+int common_pixels(const MovableObject& a, const MovableObject& b) {
   const cv::Rect both = a.box & b.box;
-  if (both.empty()) return 0.0;
-  const cv::Mat common = a.mask(both - a.box.tl()) & b.mask(both - b.box.tl());
+  if (both.empty()) return 0;
+  return cv::countNonZero(a.mask(both - a.box.tl()) & b.mask(both - b.box.tl()));
+}
+
+double overlap(const MovableObject& a, const MovableObject& b) {
   const int smaller = std::min(cv::countNonZero(a.mask), cv::countNonZero(b.mask));
-  return smaller == 0 ? 0.0 : static_cast<double>(cv::countNonZero(common)) / smaller;
+  return smaller == 0 ? 0.0 : static_cast<double>(common_pixels(a, b)) / smaller;
 }
 
 float median_depth(const MovableObject& object, const cv::Mat& depth, const CellGrid& grid) {
@@ -144,10 +155,7 @@ float median_depth(const MovableObject& object, const cv::Mat& depth, const Cell
       if (object.mask.at<std::uint8_t>(pixel - object.box.tl()) != 0) known.push_back(z);
     }
   }
-  if (known.empty()) return 0.0F;
-  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-  std::nth_element(known.begin(), middle, known.end());
-  return *middle;
+  return known.empty() ? 0.0F : median(known);
 }
 
 }  // namespace roslam

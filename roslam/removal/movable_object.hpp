@@ -34,10 +34,15 @@ std::vector<MovableObject> find_objects(const Segmentation& segmentation, const 
 /// Sets an object's pixels in an image of the picture's size (CV_8UC1).
 void paint(const MovableObject& object, cv::Mat& image, int value = 255);
 
-/// Takes box and mask from the nonzero pixels of an image of the picture's size. False if there are none.
+/// Takes box and mask from the nonzero pixels of an image of the picture's size. False, and the object is
+/// left as it is, if there are none.
 bool take_mask(MovableObject& object, const cv::Mat& image);
 
-/// Pixels two objects have in common, as a share of the smaller one.
+/// False for what geometry alone has seen no more than once: that may be noise.
+bool is_confirmed(const MovableObject& object);
+
+/// Pixels two objects have in common, and their share of the smaller one.
+int common_pixels(const MovableObject& a, const MovableObject& b);
 double overlap(const MovableObject& a, const MovableObject& b);
 
 /// Median of the known depth (of cells) under the object's mask; 0 if none is known.

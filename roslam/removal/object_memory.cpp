@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "roslam/geometry/median.hpp"
+
 namespace roslam {
 
 namespace {
@@ -49,12 +51,7 @@ cv::Matx23d similarity(const std::vector<cv::Point2f>& from, const std::vector<c
     dx.push_back(to[i].x - from[i].x);
     dy.push_back(to[i].y - from[i].y);
   }
-  const auto middle = [](std::vector<float>& values) {
-    const auto m = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), m, values.end());
-    return *m;
-  };
-  return {1.0, 0.0, middle(dx), 0.0, 1.0, middle(dy)};
+  return {1.0, 0.0, median(dx), 0.0, 1.0, median(dy)};
 }
 
 // How a thing at rest at the object's depth seems to move.
@@ -127,11 +124,12 @@ void ObjectMemory::carry(const PastFrame& last, const PastFrame& current, const 
 
 MovableObject* ObjectMemory::best_match(const MovableObject& object, const std::vector<bool>& taken) {
   MovableObject* best = nullptr;
-  double most = kSame;
+  int most = 0;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     if (taken[i]) continue;
-    const double common = overlap(objects_[i], object);
-    if (common > most) {
+    // Not the largest share: a scrap that lies within the thing would win.
+    const int common = common_pixels(objects_[i], object);
+    if (common > most && overlap(objects_[i], object) > kSame) {
       most = common;
       best = &objects_[i];
     }
@@ -167,13 +165,16 @@ void ObjectMemory::join(std::vector<MovableObject> labelled, double timestamp) {
   objects_ = std::move(labelled);
 }
 
-void ObjectMemory::join_unlabelled(std::vector<MovableObject> found, double timestamp) {
+std::vector<int> ObjectMemory::join_unlabelled(std::vector<MovableObject> found, double timestamp) {
+  std::vector<int> ids;
   std::vector<bool> taken(objects_.size(), false);
   std::vector<MovableObject> joined;
   for (auto& object : found) {
     const MovableObject* match = best_match(object, taken);
-    if (match != nullptr && match->kind != Movable::kUnknown) continue;  // a labelled thing explains it
-    object.id = match != nullptr ? match->id : ++last_id_;
+    const bool is_explained = match != nullptr && match->kind != Movable::kUnknown;
+    ids.push_back(is_explained ? 0 : match != nullptr ? match->id : ++last_id_);
+    if (is_explained) continue;
+    object.id = ids.back();
     object.last_seen = timestamp;
     if (match != nullptr) {
       taken[static_cast<std::size_t>(match - objects_.data())] = true;
@@ -185,10 +186,11 @@ void ObjectMemory::join_unlabelled(std::vector<MovableObject> found, double time
     MovableObject& object = objects_[i];
     const bool is_unlabelled = object.kind == Movable::kUnknown;
     if (is_unlabelled && (taken[i] || timestamp - object.last_seen > kKeepUnlabelled)) continue;
-    if (is_unlabelled) ++object.misses;
+    if (is_unlabelled && object.last_seen < timestamp) ++object.misses;
     joined.push_back(std::move(object));
   }
   objects_ = std::move(joined);
+  return ids;
 }
 
 }  // namespace roslam

@@ -30,8 +30,9 @@ class ObjectMemory {
   /// doubted at the first label that is less sure.
   void join(std::vector<MovableObject> labelled, double timestamp);
 
-  /// Joins what geometry alone found in the current frame.
-  void join_unlabelled(std::vector<MovableObject> found, double timestamp);
+  /// Joins what geometry alone found in the current frame. Gives the number of each; 0 where a labelled thing
+  /// explains it.
+  std::vector<int> join_unlabelled(std::vector<MovableObject> found, double timestamp);
 
   std::vector<MovableObject>& objects() { return objects_; }
   const std::vector<MovableObject>& objects() const { return objects_; }

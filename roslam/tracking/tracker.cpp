@@ -130,7 +130,7 @@ bool Tracker::follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_wor
   // decide.
   const bool matched = ((velocity_ || T_camera_world) && match_last_frame(frame, predicted, 1.0F)) ||
                        match_reference(frame) || match_last_frame(frame, predicted, kWider);
-  return matched && refine_with_local_map(frame);
+  return matched && refine_with_local_map(frame, last_.reference);
 }
 
 SE3 Tracker::last_pose() const {
@@ -280,9 +280,9 @@ void Tracker::match_local_landmarks(TrackedFrame& frame) {
   }
 }
 
-bool Tracker::refine_with_local_map(TrackedFrame& frame) {
+bool Tracker::refine_with_local_map(TrackedFrame& frame, KeyframeId near) {
   const Stopwatch watch;
-  local_map_.update(map_, frame.landmarks, last_.reference);
+  local_map_.update(map_, frame.landmarks, near);
   frame.reference = local_map_.reference();
   match_local_landmarks(frame);
   times_.match_map += watch.seconds();
@@ -325,10 +325,8 @@ bool Tracker::relocalise(TrackedFrame& frame) {
   if (!found) return false;
   frame.T_camera_world = found->T_camera_world;
   frame.landmarks = found->landmarks;
-  velocity_.reset();
-  last_.reference = found->keyframe;
   // A wrong place must not be taken for the right one: the local map has to confirm it twice as strongly.
-  return refine_with_local_map(frame) && frame.inliers >= 2 * settings_.tracker.min_inliers;
+  return refine_with_local_map(frame, found->keyframe) && frame.inliers >= 2 * settings_.tracker.min_inliers;
 }
 
 void Tracker::count_predictions(const TrackedFrame& frame) {

@@ -108,7 +108,7 @@ class Tracker {
   bool follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_world);
   bool match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor);
   bool match_reference(TrackedFrame& frame);
-  bool refine_with_local_map(TrackedFrame& frame);
+  bool refine_with_local_map(TrackedFrame& frame, KeyframeId near);
   bool predict_hidden(TrackedFrame& frame, const FrameHint& hint);
   bool relocalise(TrackedFrame& frame);
   bool estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
