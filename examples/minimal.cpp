@@ -14,6 +14,7 @@ int main(int argc, char** argv) try {
     return 2;
   }
   roslam::TumSource source(argv[1], roslam::load_camera(argv[2]));
+  // Geometry finds what moves; a roslam::PspnetSegmenter, as the last argument, adds labels.
   roslam::Slam slam(source.camera());
   while (const auto frame = source.next()) {
     const auto result = slam.process(*frame);
