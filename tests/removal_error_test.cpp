@@ -171,7 +171,7 @@ TEST(RemovalError, ReportsSharesAndWhatHasNone) {
                             "within 10 pixels", "59.4 % of the actors", "3 frames left out"}) {
     EXPECT_NE(table.find(words), std::string::npos) << words << "\n" << table;
   }
-  EXPECT_EQ(table.find("differ"), std::string::npos) << table;
+  EXPECT_EQ(table.find("not as many"), std::string::npos) << table;
   const auto json = nlohmann::json::parse(to_json(error));
   EXPECT_EQ(json["actor_points"]["kept_share"], 0.5);
   EXPECT_EQ(json["static_points"]["kept"], 63);

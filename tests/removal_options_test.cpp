@@ -92,12 +92,25 @@ TEST(RemovalOptions, LimitsThemselvesAreValid) {
 }
 
 TEST(RemovalOptions, ModesAreNamedAndRecognised) {
-  for (const char* name : {"none", "labels", "geometry", "both"}) {
+  EXPECT_EQ(removal_modes().size(), 6U);
+  for (const std::string& name : removal_modes()) {
     const auto options = removal_from(name);
     ASSERT_TRUE(options) << name;
     EXPECT_EQ(mode_of(*options), name);
-    EXPECT_EQ(options->is_on(), std::string(name) != "none");
+    EXPECT_EQ(options->is_on(), name != "none");
   }
+  const auto ds_slam = removal_from("ds-slam-like");
+  EXPECT_TRUE(ds_slam->labels && ds_slam->flow && ds_slam->keep_resting);
+  EXPECT_FALSE(ds_slam->free_space || ds_slam->refine);
+  const auto dynaslam = removal_from("dynaslam-like");
+  EXPECT_TRUE(dynaslam->labels && dynaslam->free_space);
+  EXPECT_FALSE(dynaslam->flow || dynaslam->keep_resting);
+  EXPECT_EQ(dynaslam->sure, 0.0);
+  EXPECT_EQ(dynaslam->scarce_points, 0);
+  // The same switches alone make nothing like another system.
+  RemovalOptions without_flow;
+  without_flow.flow = false;
+  EXPECT_EQ(mode_of(without_flow), "both");
   EXPECT_TRUE(removal_from("labels")->labels);
   EXPECT_FALSE(removal_from("labels")->free_space || removal_from("labels")->flow);
   EXPECT_FALSE(removal_from("geometry")->labels);

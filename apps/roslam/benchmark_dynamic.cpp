@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <set>
 #include <thread>
 
 #include "apps/roslam/benchmark.hpp"
@@ -90,7 +91,10 @@ std::optional<RemovalError> removal_of(const BenchmarkedSequence& measured, cons
     source.seed = settings.seed;
   }
   try {
-    return evaluate_removal_of_run(source, fs::path(arguments.out) / runs.front()->folder, {stop, true});
+    auto error =
+        evaluate_removal_of_run(source, fs::path(arguments.out) / runs.front()->folder, {stop, true});
+    if (error && error->interrupted) return std::nullopt;
+    return error;
   } catch (const InputError& error) {
     std::fprintf(stderr, "note: %s: what was removed cannot be told: %s\n", sequence.name.c_str(),
                  error.what());
@@ -104,7 +108,10 @@ std::vector<BenchmarkedSequence> known_runs(const DynamicReport& report, const B
   for (const auto& result : report.results) {
     if (result.twin_by_mode.size() != report.modes.size()) continue;
     const BenchmarkSequence& known = result.twin_by_mode.front().sequence;
-    if (known.source == twin.source && known.camera == twin.camera) return result.twin_by_mode;
+    if (!has_same_frames(known, twin)) continue;
+    auto runs = result.twin_by_mode;
+    for (auto& run : runs) run.sequence.name = twin.name;
+    return runs;
   }
   return {};
 }
@@ -149,6 +156,8 @@ void execute(DynamicArguments arguments, const std::string& version) {
   BenchmarkArguments& common = arguments.common;
   const fs::path out = common.out;
   make_folder(out);
+  if (std::set<std::string>(arguments.modes.begin(), arguments.modes.end()).size() != arguments.modes.size())
+    throw CLI::ValidationError("--modes", "names a mode twice");
   // What is wrong for every run shall be found before the first.
   if (!common.settings.config.empty()) read_options(common.settings.config);
   require_weights(arguments.modes);
@@ -168,6 +177,7 @@ void execute(DynamicArguments arguments, const std::string& version) {
   for (const auto& pair : pairs) {
     if (interrupt.token().stop_requested()) break;
     measure_modes(pair, common, report, interrupt.token());
+    report.is_interrupted = interrupt.token().stop_requested();
     write_report(report, out);
   }
   if (report.is_interrupted) std::fprintf(stderr, "interrupted: the report holds what was complete\n");

@@ -36,11 +36,16 @@ struct DynamicReport {
   std::string bars;  ///< the bar chart; relative to the benchmark's folder, empty if there is nothing to draw
 };
 
+inline constexpr double kAllTracked = 0.9995;  ///< share of the frames from which on it is all of them
+
 /// A mode with the system that it stands for.
 std::string title_of_mode(const std::string& mode);
 
 /// Median error of the mode of that number in metres; NaN if it is not known.
 double ate_in(const std::vector<BenchmarkedSequence>& results, std::size_t mode);
+
+/// The same, NaN also where frames or runs were lost: an error over a part of them is no smaller error.
+double whole_ate_in(const std::vector<BenchmarkedSequence>& results, std::size_t mode);
 
 // Neither holds a date: two reports differ where results do. Medians are over complete runs.
 std::string dynamic_markdown(const DynamicReport& report);

@@ -31,6 +31,13 @@ double ate_in(const std::vector<BenchmarkedSequence>& results, std::size_t mode)
   return mode < results.size() ? median_of(results[mode], ate_of) : std::numeric_limits<double>::quiet_NaN();
 }
 
+double whole_ate_in(const std::vector<BenchmarkedSequence>& results, std::size_t mode) {
+  const bool is_whole = mode < results.size() &&
+                        results[mode].complete_runs().size() == results[mode].runs.size() &&
+                        median_of(results[mode], tracked_share_of) >= kAllTracked;
+  return is_whole ? ate_in(results, mode) : std::numeric_limits<double>::quiet_NaN();
+}
+
 cv::Mat dynamic_bars(const DynamicReport& report) {
   BarChart chart;
   chart.title = "Error of the trajectory by what is removed";
@@ -39,7 +46,7 @@ cv::Mat dynamic_bars(const DynamicReport& report) {
   bool has_any = false;
   const auto add = [&](const std::string& name, const std::vector<BenchmarkedSequence>& results) {
     BarGroup group{name, {}};
-    for (std::size_t i = 0; i < report.modes.size(); ++i) group.values.push_back(ate_in(results, i));
+    for (std::size_t i = 0; i < report.modes.size(); ++i) group.values.push_back(whole_ate_in(results, i));
     has_any |=
         std::any_of(group.values.begin(), group.values.end(), [](double v) { return std::isfinite(v); });
     chart.groups.push_back(std::move(group));

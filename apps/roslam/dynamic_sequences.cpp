@@ -2,7 +2,9 @@
 #include "apps/roslam/dynamic_sequences.hpp"
 
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "apps/roslam/paper_tables.hpp"
 #include "roslam/error.hpp"
@@ -79,6 +81,26 @@ BenchmarkSequence named_twin(const std::string& argument, const BenchmarkSequenc
   return twin;
 }
 
+// Results that share a name would overwrite each other.
+void require_names_differ(const std::vector<DynamicSequence>& pairs) {
+  std::set<std::string> taken{"bars"};
+  const auto take = [&](const std::string& name) {
+    if (!taken.insert(name).second) {
+      throw InputError("--sequences: two results would be called '" + name +
+                       "'; rename a folder, or run them one after the other");
+    }
+  };
+  for (const auto& pair : pairs) {
+    take(pair.sequence.name);
+    if (pair.twin) take(pair.twin->name);
+  }
+}
+
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
 std::vector<std::string> sequences_of_table_3(const fs::path& tum) {
   std::vector<std::string> found;
   for (const auto& row : paper_table_3()) {
@@ -92,6 +114,15 @@ std::vector<std::string> sequences_of_table_3(const fs::path& tum) {
   return found;
 }
 }  // namespace
+
+bool has_same_frames(const BenchmarkSequence& a, const BenchmarkSequence& b) {
+  if (a.source == b.source && a.camera == b.camera) return true;
+  const fs::path one = a.source;
+  const fs::path other = b.source;
+  return text_of(one / "rgb.txt") == text_of(other / "rgb.txt") &&
+         text_of(one / "depth.txt") == text_of(other / "depth.txt") &&
+         camera_to_yaml(load_camera(a.camera)) == camera_to_yaml(load_camera(b.camera));
+}
 
 std::vector<DynamicSequence> find_dynamic_sequences(const DynamicSequenceArguments& arguments,
                                                     const fs::path& out) {
@@ -113,6 +144,7 @@ std::vector<DynamicSequence> find_dynamic_sequences(const DynamicSequenceArgumen
                          : twin_of(sequence, arguments.has_traffic, out);
     result.push_back({std::move(sequence), std::move(twin)});
   }
+  require_names_differ(result);
   return result;
 }
 

@@ -25,6 +25,9 @@ struct DynamicSequenceArguments {
   bool has_traffic = true;             ///< of simulated flights; one without is no twin to itself
 };
 
+/// Whether two recordings list the same images of the same camera.
+bool has_same_frames(const BenchmarkSequence& a, const BenchmarkSequence& b);
+
 /// The sequences with their twins: a simulated flight has itself without traffic; what `roslam compose` wrote
 /// has the frames it was made of, for which a folder of lists is written to out/twins. Those of table 3 of
 /// the paper that lie in the TUM folder come first, in its order. Throws InputError, CalibrationError or

@@ -86,15 +86,18 @@ void require_sense(const RemovalError& error, const RemovalTruth& truth, const s
     if (error.not_in_run > 0) reasons["not in the run"] = error.not_in_run;
     if (error.without_truth > 0) reasons["true mask missing or unusable"] = error.without_truth;
     if (error.without_mask > 0) reasons["mask of the run missing or unusable"] = error.without_mask;
-    throw InputError(run_folder.string() + ": no frame can be compared with " + source + in_words(reasons) +
-                     kOtherSource);
+    const bool is_truth_bad = error.without_truth > 0 && error.not_in_run + error.without_mask == 0;
+    throw InputError(
+        run_folder.string() + ": no frame can be compared with " + source + in_words(reasons) +
+        (is_truth_bad ? "; instances/ must hold 16-bit images, labels/ 8-bit ones" : kOtherSource));
   }
   // Where nothing was removed most pictures have as many points as are wanted, whatever they show.
-  const std::size_t telling = error.with_mask > 0 ? error.with_mask : error.frames;
-  if (2 * error.unlike_run > telling) {
-    throw InputError(run_folder.string() + ": " + std::to_string(error.unlike_run) + " of " +
-                     std::to_string(error.frames) + " frames of " + source +
-                     " have not as many points as the run counted" + kOtherSource);
+  const bool has_masks = error.with_mask > 0;
+  const std::size_t telling = has_masks ? error.with_mask : error.frames;
+  const std::size_t unlike = has_masks ? error.unlike_with_mask : error.unlike_run;
+  if (2 * unlike > telling) {
+    throw InputError(run_folder.string() + ": " + std::to_string(unlike) + " of " + std::to_string(telling) +
+                     " frames of " + source + " have not as many points as the run counted" + kOtherSource);
   }
 }
 }  // namespace

@@ -2,7 +2,6 @@
 #include "roslam/evaluation/bar_chart.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <sstream>
 

@@ -18,7 +18,7 @@ struct BarChart {
   std::string value_label;          ///< what the values are, with their unit
   std::vector<std::string> series;  ///< names for the legend, in the order of the values
   std::vector<BarGroup> groups;
-  int decimals = 3;  ///< of the value that stands on each bar
+  int decimals = 4;  ///< of the value that stands on each bar
 };
 
 /// The chart as a picture (CV_8UC3). The scale is logarithmic, as errors differ by factors, and each bar

@@ -113,6 +113,7 @@ RemovalComparison::Extraction RemovalComparison::extract_as_run(const cv::Mat& g
     if (lenient.counted(mask) == *run.points) return lenient;
   }
   ++error_.unlike_run;
+  if (!mask.empty()) ++error_.unlike_with_mask;
   return points;
 }
 

@@ -43,13 +43,14 @@ struct RemovalError {
   std::uint64_t removed_pixels = 0;        ///< under the mask as the run dilated it
   std::uint64_t removed_actor_pixels = 0;  ///< of the actors' under that mask
 
-  std::size_t frames = 0;         ///< compared
-  std::size_t with_mask = 0;      ///< frames compared of which the run removed something
-  std::size_t without_truth = 0;  ///< frames left out: the true mask is missing or unusable
-  std::size_t without_mask = 0;   ///< frames left out: the mask of the run is missing or unusable
-  std::size_t not_in_run = 0;     ///< frames left out: the run dropped or never reached them
-  std::size_t unlike_run = 0;     ///< frames compared whose points are not as many as the run counted
-  bool interrupted = false;       ///< frames are missing at the end
+  std::size_t frames = 0;            ///< compared
+  std::size_t with_mask = 0;         ///< frames compared of which the run removed something
+  std::size_t without_truth = 0;     ///< frames left out: the true mask is missing or unusable
+  std::size_t without_mask = 0;      ///< frames left out: the mask of the run is missing or unusable
+  std::size_t not_in_run = 0;        ///< frames left out: the run dropped or never reached them
+  std::size_t unlike_run = 0;        ///< frames compared whose points are not as many as the run counted
+  std::size_t unlike_with_mask = 0;  ///< those of them of which the run removed something
+  bool interrupted = false;          ///< frames are missing at the end
 
   PointTally on_static_scene() const;
   /// Shares of points and of pixels; NaN where there is nothing to divide by.

@@ -32,6 +32,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("removal", "max_labelled_share", o.removal.max_labelled_share);
   visit("removal", "min_object_share", o.removal.min_object_share);
   visit("removal", "sure", o.removal.sure);
+  visit("removal", "keep_resting", o.removal.keep_resting);
   visit("removal", "keep_missed", o.removal.keep_missed);
   visit("removal", "history", o.removal.history);
   visit("removal", "history_interval", o.removal.history_interval);

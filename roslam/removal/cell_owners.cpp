@@ -67,7 +67,8 @@ cv::Mat owners_of_pixels(const CellScene& scene, const std::vector<MovableObject
   cv::Mat owners = grid.in_pixels(cells);
   for (std::size_t i = 0; i < objects.size(); ++i) {
     // The network draws finer borders than cells have.
-    if (!objects[i].is_believed || (!is_fresh(objects[i]) && options.free_space)) continue;
+    if (!objects[i].is_believed || !is_confirmed(objects[i])) continue;
+    if (!is_fresh(objects[i]) && options.free_space) continue;
     cv::Mat view = owners(objects[i].box);
     view.setTo(static_cast<int>(i) + 1, objects[i].mask & (view == 0));
   }

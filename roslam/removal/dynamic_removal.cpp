@@ -19,6 +19,14 @@ std::optional<std::size_t> position_of(int id, const std::vector<int>& ids) {
   if (found == ids.end()) return std::nullopt;
   return static_cast<std::size_t>(found - ids.begin());
 }
+
+// Whether a labelled thing is to go: a doubtful one only if it lasts and is not seen to rest.
+bool is_removable(const MovableObject& object, bool is_sure, const ObjectEvidence& evidence,
+                  const RemovalOptions& options) {
+  constexpr int kConfirmed = 3;  // labels that a doubtful thing must be seen in: noise comes and goes
+  if (is_sure && !options.keep_resting) return true;
+  return (is_sure || object.sightings >= kConfirmed) && !seems_at_rest(evidence, options);
+}
 }  // namespace
 
 DynamicRemoval::DynamicRemoval(const Camera& camera, const Settings& settings)
@@ -155,15 +163,14 @@ void DynamicRemoval::weigh(CellScene& scene) {
     const bool is_sure =
         object.kind != Movable::kUnknown && static_cast<double>(object.sureness) >= options.sure;
     object.is_at_rest = is_sure && rests(evidence[i + 1], options);
-    constexpr int kConfirmed = 3;  // labels that an uncertain thing must be seen in: noise comes and goes
-    object.is_believed =
-        object.kind == Movable::kUnknown
-            ? !contradicts_motion(evidence[i + 1])
-            : is_sure || (object.sightings >= kConfirmed && !seems_at_rest(evidence[i + 1], options));
+    object.is_believed = object.kind == Movable::kUnknown
+                             ? !contradicts_motion(evidence[i + 1])
+                             : is_removable(object, is_sure, evidence[i + 1], options);
     if (!object.is_believed) scene.owners.setTo(0, scene.owners == number);
     // Only what no thing owns is looked through for new ones: those known by now are seen again here.
-    const bool still_moves = evidence[i + 1].moving > 0 || evidence[i + 1].flow_moving > 0;
-    if (object.kind == Movable::kUnknown && object.is_believed && still_moves) {
+    constexpr int kFewest = 4;  // cells: one or two may be noise
+    if (object.kind == Movable::kUnknown && object.is_believed &&
+        cv::countNonZero(scene.moving & (scene.owners == number)) >= kFewest) {
       object.last_seen = current_.timestamp;
       object.misses = 0;
     }

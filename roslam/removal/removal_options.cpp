@@ -41,7 +41,6 @@ struct NamedMode {
   bool flow;
 };
 
-// Where two could be meant, mode_of takes the first.
 constexpr std::array kModes{
     NamedMode{"none", false, false, false},       NamedMode{"labels", true, false, false},
     NamedMode{"geometry", false, true, true},     NamedMode{"both", true, true, true},
@@ -63,20 +62,20 @@ std::optional<RemovalOptions> removal_from(std::string_view mode, const RemovalO
   options.free_space = found->free_space;
   options.flow = found->flow;
   if (mode == "ds-slam-like") {
-    options.sure = 1.0;
+    options.keep_resting = true;
     options.refine = false;
   } else if (mode == "dynaslam-like") {
     options.sure = 0.0;
+    options.scarce_points = 0;
   }
   return options;
 }
 
 std::string_view mode_of(const RemovalOptions& options) {
-  const auto* const found = std::find_if(kModes.begin(), kModes.end(), [&](const NamedMode& known) {
-    return known.labels == options.labels && known.free_space == options.free_space &&
-           known.flow == options.flow;
-  });
-  return found == kModes.end() ? "geometry" : found->name;
+  for (const NamedMode& mode : kModes) {
+    if (removal_from(mode.name, options) == options) return mode.name;
+  }
+  return options.labels ? "both" : "geometry";
 }
 
 }  // namespace roslam

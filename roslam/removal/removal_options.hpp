@@ -22,6 +22,7 @@ struct RemovalOptions {
   double max_labelled_share = 0.9;  ///< of the picture; a network that labels more as movable is not believed
   double min_object_share = 0.0005;  ///< of the picture; smaller things are not told apart from noise
   double sure = 0.5;                 ///< mean probability from which a label is believed against quick doubts
+  bool keep_resting = false;         ///< labelled things that geometry sees at rest are not removed
   double keep_missed = 0.5;          ///< seconds that a thing is kept which newer labels miss
 
   // Geometry.
@@ -44,6 +45,8 @@ struct RemovalOptions {
   void validate() const;
 
   bool is_on() const { return labels || free_space || flow; }
+
+  bool operator==(const RemovalOptions&) const = default;
 };
 
 /// What `--dynamic` knows, and how other systems are stood in for:
@@ -53,15 +56,16 @@ struct RemovalOptions {
 ///   both           the two together: RO-SLAM
 ///   ds-slam-like   labelled things go unless the optical flow finds them at rest, as in DS-SLAM (Yu et al.,
 ///                  IROS 2018), and so do unlabelled things that it sees moving
-///   dynaslam-like  all labelled things go, and what the depth of earlier views contradicts, as in DynaSLAM
-///                  (Bescos et al., RA-L 2018)
+///   dynaslam-like  all labelled things go, at rest or not, and what the depth of earlier views contradicts,
+///   as
+///                  in DynaSLAM (Bescos et al., RA-L 2018)
 /// The last two are our parts put together in their manner, with our network; they are not those systems.
 std::vector<std::string> removal_modes();
 
 /// base in one of these modes. Nothing for another name.
 std::optional<RemovalOptions> removal_from(std::string_view mode, const RemovalOptions& base = {});
 
-/// The name of the mode that these options come closest to.
+/// The name of the mode that these options are in; of those like other systems only if they are so in full.
 std::string_view mode_of(const RemovalOptions& options);
 
 }  // namespace roslam
