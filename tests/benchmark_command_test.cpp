@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -9,8 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
-#include "tests/program.hpp"
-#include "tests/scratch.hpp"
+#include "tests/benchmark_fixture.hpp"
 
 namespace roslam {
 namespace {
@@ -18,19 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-class BenchmarkStatic : public testing::Test {
- protected:
-  const fs::path folder_ = scratch_path();
-
-  void SetUp() override {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  Outcome shell(const std::string& command) const { return shell_in(folder_, command); }
-  Outcome roslam(const std::string& arguments) const { return shell("'" ROSLAM_PROGRAM "' " + arguments); }
-};
+class BenchmarkStatic : public BenchmarkTest {};
 
 TEST_F(BenchmarkStatic, RunsASimulatedFlightTwiceAndReportsIt) {
   const auto result = roslam("benchmark static --frames 20 --runs 2 --out results --json");
@@ -127,11 +113,7 @@ TEST_F(BenchmarkStatic, ExitsWithOneAndOneLineOnBadInput) {
            {"--sequences flight:no-camera --out results", "no-camera"},
            {"--config bad.yaml --out results", "nonsense"},
            {"--out file/results", "--out"}}) {
-    const auto result = roslam("benchmark static --runs 1 " + arguments);
-    EXPECT_EQ(result.code, 1) << arguments;
-    EXPECT_NE(result.error.find(words), std::string::npos) << arguments << " -> " << result.error;
-    EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
-    EXPECT_EQ(result.out, "") << arguments;
+    expect_refused("benchmark static --runs 1 " + arguments, words);
   }
 }
 

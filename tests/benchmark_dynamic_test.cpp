@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -11,8 +10,7 @@
 
 #include "roslam/error.hpp"
 #include "roslam/evaluation/bar_chart.hpp"
-#include "tests/program.hpp"
-#include "tests/scratch.hpp"
+#include "tests/benchmark_fixture.hpp"
 
 namespace roslam {
 namespace {
@@ -20,20 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-class BenchmarkDynamic : public testing::Test {
- protected:
-  const fs::path folder_ = scratch_path();
-
-  void SetUp() override {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  Outcome roslam(const std::string& arguments) const {
-    return shell_in(folder_, "'" ROSLAM_PROGRAM "' " + arguments);
-  }
-};
+class BenchmarkDynamic : public BenchmarkTest {};
 
 TEST_F(BenchmarkDynamic, RunsEveryModeWithAndWithoutTraffic) {
   const auto result = roslam("benchmark dynamic --frames 5 --runs 1 --out results --json");
@@ -171,11 +156,7 @@ TEST_F(BenchmarkDynamic, ExitsWithOneLineOnBadInput) {
            {"--sequences made", "made/composition.json"},
            {"--sequences flight flight-still --twins flight -", "'flight-still'"},
            {"--config none.yaml", "none.yaml"}}) {
-    const auto result = roslam("benchmark dynamic --runs 1 --out results " + arguments);
-    EXPECT_EQ(result.code, 1) << arguments;
-    EXPECT_NE(result.error.find(words), std::string::npos) << arguments << " -> " << result.error;
-    EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
-    EXPECT_EQ(result.out, "") << arguments;
+    expect_refused("benchmark dynamic --runs 1 --out results " + arguments, words);
   }
   EXPECT_EQ(roslam("benchmark dynamic --out r --modes magic").code, 2);
   EXPECT_EQ(roslam("benchmark dynamic --out r --modes none none").code, 2);

@@ -5,11 +5,9 @@
 #include <iostream>
 #include <memory>
 #include <set>
-#include <thread>
 
 #include "apps/roslam/benchmark.hpp"
 #include "apps/roslam/benchmark_measure.hpp"
-#include "apps/roslam/benchmark_metrics.hpp"
 #include "apps/roslam/dynamic_report.hpp"
 #include "apps/roslam/interrupt.hpp"
 #include "apps/roslam/output.hpp"
@@ -164,15 +162,7 @@ void execute(DynamicArguments arguments, const std::string& version) {
   const auto pairs = find_dynamic_sequences(
       {common.sequences, arguments.twins, common.camera, arguments.tum, common.settings.traffic != "none"},
       out);
-  DynamicReport report{version,
-                       processor_model(),
-                       std::thread::hardware_concurrency(),
-                       common.runs,
-                       false,
-                       common.settings,
-                       arguments.modes,
-                       {},
-                       ""};
+  DynamicReport report{header_of(common, version), arguments.modes, {}, ""};
   write_report(report, out);
   for (const auto& pair : pairs) {
     if (interrupt.token().stop_requested()) break;

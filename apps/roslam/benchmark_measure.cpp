@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <fstream>
+#include <thread>
 
 #include "roslam/error.hpp"
 
@@ -24,7 +26,23 @@ std::optional<bool> whether_runs_repeat(const BenchmarkedSequence& sequence) {
   return true;
 }
 
+// "unknown" where the system does not tell.
+std::string processor_model() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    const auto colon = line.find(':');
+    if (line.starts_with("model name") && colon != std::string::npos && colon + 2 < line.size()) {
+      return line.substr(colon + 2);
+    }
+  }
+  return "unknown";
+}
 }  // namespace
+
+BenchmarkHeader header_of(const BenchmarkArguments& arguments, const std::string& version) {
+  return {version, processor_model(), std::thread::hardware_concurrency(), arguments.runs,
+          false,   arguments.settings};
+}
 
 std::vector<const BenchmarkRun*> BenchmarkedSequence::complete_runs() const {
   std::vector<const BenchmarkRun*> complete;

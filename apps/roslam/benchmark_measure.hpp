@@ -25,6 +25,19 @@ struct BenchmarkArguments {
 /// --sequences, --camera, --out, --runs, --real-time, --config, --frames, --seed, --traffic, --quiet, --json.
 void add_benchmark_options(CLI::App& command, BenchmarkArguments& arguments);
 
+/// What heads the report of a benchmark.
+struct BenchmarkHeader {
+  std::string version;    ///< of the program
+  std::string processor;  ///< its model
+  unsigned cores = 0;
+  int runs = 0;  ///< of each sequence, as asked for
+  bool is_interrupted = false;
+  BenchmarkSettings settings;
+};
+
+/// The header of a benchmark that begins on this machine.
+BenchmarkHeader header_of(const BenchmarkArguments& arguments, const std::string& version);
+
 /// All runs of one sequence under the same settings.
 struct BenchmarkedSequence {
   BenchmarkSequence sequence;

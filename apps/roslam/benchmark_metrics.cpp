@@ -3,9 +3,9 @@
 
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <limits>
 
+#include "roslam/evaluation/json_number.hpp"
 #include "roslam/evaluation/markdown_table.hpp"
 #include "roslam/evaluation/statistics.hpp"
 
@@ -105,9 +105,8 @@ double stage_count(const BenchmarkedSequence& sequence, const std::string& stage
 }
 
 nlohmann::ordered_json json_number(double value) {
-  if (!std::isfinite(value)) return nullptr;
   if (value == std::trunc(value) && std::abs(value) < 1e15) return static_cast<std::int64_t>(value);
-  return value;
+  return number(value);
 }
 
 nlohmann::ordered_json json_of(const BenchmarkedSequence& sequence) {
@@ -132,17 +131,24 @@ nlohmann::ordered_json json_of(const BenchmarkedSequence& sequence) {
   return json;
 }
 
-const char* name_of(Mode mode) { return mode == Mode::kDeterministic ? "deterministic" : "real-time"; }
-
-std::string processor_model() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);) {
-    const auto colon = line.find(':');
-    if (line.starts_with("model name") && colon != std::string::npos && colon + 2 < line.size()) {
-      return line.substr(colon + 2);
-    }
-  }
-  return "unknown";
+nlohmann::ordered_json head_json(const std::string& benchmark, const BenchmarkHeader& header) {
+  const BenchmarkSettings& settings = header.settings;
+  Json json{
+      {"benchmark", benchmark},
+      {"version", header.version},
+      {"machine", {{"processor", header.processor}, {"cores", header.cores}}},
+      {"mode", name_of(settings.mode)},
+      {"runs", header.runs},
+      {"interrupted", header.is_interrupted},
+      {"simulation", {{"traffic", settings.traffic}, {"frames", settings.frames}, {"seed", settings.seed}}}};
+  json["config"] = settings.config.empty() ? Json(nullptr) : Json(settings.config);
+  return json;
 }
+
+std::string text_of(const nlohmann::ordered_json& report) {
+  return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+const char* name_of(Mode mode) { return mode == Mode::kDeterministic ? "deterministic" : "real-time"; }
 
 }  // namespace roslam::app

@@ -45,7 +45,11 @@ nlohmann::ordered_json json_of(const BenchmarkedSequence& sequence);
 /// "deterministic" or "real-time".
 const char* name_of(Mode mode);
 
-/// The model of the processor this runs on, "unknown" where the system does not tell.
-std::string processor_model();
+/// The keys with which the JSON of every benchmark begins.
+nlohmann::ordered_json head_json(const std::string& benchmark, const BenchmarkHeader& header);
+
+/// A report as its file holds it. Names of files may hold any byte; one that is not UTF-8 is replaced, as it
+/// shall not cost the report.
+std::string text_of(const nlohmann::ordered_json& report);
 
 }  // namespace roslam::app

@@ -94,20 +94,10 @@ std::string benchmark_markdown(const BenchmarkReport& report) {
 }
 
 std::string benchmark_json(const BenchmarkReport& report) {
-  const BenchmarkSettings& settings = report.settings;
-  Json json{
-      {"benchmark", "static"},
-      {"version", report.version},
-      {"machine", {{"processor", report.processor}, {"cores", report.cores}}},
-      {"mode", name_of(settings.mode)},
-      {"runs", report.runs},
-      {"interrupted", report.is_interrupted},
-      {"simulation", {{"traffic", settings.traffic}, {"frames", settings.frames}, {"seed", settings.seed}}}};
-  json["config"] = settings.config.empty() ? Json(nullptr) : Json(settings.config);
+  Json json = head_json("static", report);
   json["sequences"] = Json::array();
   for (const auto& sequence : report.sequences) json["sequences"].push_back(json_of(sequence));
-  // Names of files may hold any byte; one that is not UTF-8 shall not cost the report.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return text_of(json);
 }
 
 }  // namespace roslam::app

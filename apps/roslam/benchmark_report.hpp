@@ -8,13 +8,7 @@
 
 namespace roslam::app {
 
-struct BenchmarkReport {
-  std::string version;    ///< of the program
-  std::string processor;  ///< its model
-  unsigned cores = 0;
-  int runs = 0;  ///< of each sequence, as asked for
-  bool is_interrupted = false;
-  BenchmarkSettings settings;
+struct BenchmarkReport : BenchmarkHeader {
   std::vector<BenchmarkedSequence> sequences;
 };
 

@@ -3,10 +3,8 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <thread>
 
 #include "apps/roslam/benchmark.hpp"
-#include "apps/roslam/benchmark_metrics.hpp"
 #include "apps/roslam/benchmark_report.hpp"
 #include "apps/roslam/benchmark_sequences.hpp"
 #include "apps/roslam/interrupt.hpp"
@@ -67,13 +65,7 @@ void execute(const BenchmarkArguments& arguments, const std::string& version) {
   const InterruptWatcher interrupt;
   const fs::path out = arguments.out;
   make_folder(out);
-  BenchmarkReport report{version,
-                         processor_model(),
-                         std::thread::hardware_concurrency(),
-                         arguments.runs,
-                         false,
-                         arguments.settings,
-                         {}};
+  BenchmarkReport report{header_of(arguments, version), {}};
   // A wrong file of options would fail every run.
   if (!arguments.settings.config.empty()) read_options(arguments.settings.config);
   const auto sequences = find_sequences(arguments.sequences, arguments.camera);

@@ -98,12 +98,13 @@ std::string table_of_ratios(const DynamicReport& report) {
     const double base =
         whole_ate_in(result.twin_by_mode, static_cast<std::size_t>(none - report.modes.begin()));
     if (!std::isfinite(base)) continue;
-    rows.push_back({table_cell(result.sequence.name)});
-    for (std::size_t i = 0; i < report.modes.size(); ++i)
-      rows.back().push_back(fixed(whole_ate_in(result.by_mode, i) / base, 2));
-    rows.push_back({"- nothing moving"});
-    for (std::size_t i = 0; i < report.modes.size(); ++i)
-      rows.back().push_back(fixed(whole_ate_in(result.twin_by_mode, i) / base, 2));
+    const auto add = [&](const std::string& name, const Results& results) {
+      rows.push_back({name});
+      for (std::size_t i = 0; i < report.modes.size(); ++i)
+        rows.back().push_back(fixed(whole_ate_in(results, i) / base, 2));
+    };
+    add(table_cell(result.sequence.name), result.by_mode);
+    add("- nothing moving", result.twin_by_mode);
   }
   if (rows.size() == 1) return "";
   return "\n## Against the twin with nothing moving and nothing removed\n\n" + markdown_table(rows);

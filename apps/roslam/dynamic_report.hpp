@@ -24,13 +24,8 @@ struct DynamicResult {
   std::string figure;  ///< the trajectories; relative to the benchmark's folder, empty if there is none
 };
 
-struct DynamicReport {
-  std::string version;    ///< of the program
-  std::string processor;  ///< its model
-  unsigned cores = 0;
-  int runs = 0;  ///< of each sequence in each mode, as asked for
-  bool is_interrupted = false;
-  BenchmarkSettings settings;      ///< but for its mode of removal
+/// The mode of removal in the settings counts for nothing here, and runs are those of each mode.
+struct DynamicReport : BenchmarkHeader {
   std::vector<std::string> modes;  ///< names of removal_modes()
   std::vector<DynamicResult> results;
   std::string bars;  ///< the bar chart; relative to the benchmark's folder, empty if there is nothing to draw

@@ -59,16 +59,7 @@ cv::Mat dynamic_bars(const DynamicReport& report) {
 }
 
 std::string dynamic_json(const DynamicReport& report) {
-  const BenchmarkSettings& settings = report.settings;
-  Json json{
-      {"benchmark", "dynamic"},
-      {"version", report.version},
-      {"machine", {{"processor", report.processor}, {"cores", report.cores}}},
-      {"mode", name_of(settings.mode)},
-      {"runs", report.runs},
-      {"interrupted", report.is_interrupted},
-      {"simulation", {{"traffic", settings.traffic}, {"frames", settings.frames}, {"seed", settings.seed}}}};
-  json["config"] = settings.config.empty() ? Json(nullptr) : Json(settings.config);
+  Json json = head_json("dynamic", report);
   json["removal_modes"] = report.modes;
   json["bars"] = report.bars.empty() ? Json(nullptr) : Json(report.bars);
   json["sequences"] = Json::array();
@@ -83,8 +74,7 @@ std::string dynamic_json(const DynamicReport& report) {
     }
     json["sequences"].push_back(std::move(sequence));
   }
-  // Names of files may hold any byte; one that is not UTF-8 shall not cost the report.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return text_of(json);
 }
 
 }  // namespace roslam::app

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "roslam/geometry/median.hpp"
+#include "roslam/geometry/upper_median.hpp"
 
 namespace roslam {
 
@@ -119,7 +119,7 @@ FollowedPoints FlowCheck::follow(const PastFrame& past, const PastFrame& current
   if (errors.size() < kFewest) return {};
   // Most points are at rest, so their spread tells how good pixels and pose are in this frame.
   constexpr double kSigmaOfMedian = 1.1774;  // of a length in the plane, Rayleigh distribution
-  const double sigma = std::max(1.0, std::sqrt(median(errors)) / kSigmaOfMedian);
+  const double sigma = std::max(1.0, std::sqrt(upper_median(errors)) / kSigmaOfMedian);
   const double limit = options_.flow_tolerance * options_.flow_tolerance;
   FollowedPoints result;
   result.sigma = sigma;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "roslam/geometry/median.hpp"
+#include "roslam/geometry/upper_median.hpp"
 
 namespace roslam {
 
@@ -155,7 +155,7 @@ float median_depth(const MovableObject& object, const cv::Mat& depth, const Cell
       if (object.mask.at<std::uint8_t>(pixel - object.box.tl()) != 0) known.push_back(z);
     }
   }
-  return known.empty() ? 0.0F : median(known);
+  return known.empty() ? 0.0F : upper_median(known);
 }
 
 }  // namespace roslam

@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "roslam/geometry/median.hpp"
+#include "roslam/geometry/upper_median.hpp"
 
 namespace roslam {
 
@@ -51,7 +51,7 @@ cv::Matx23d similarity(const std::vector<cv::Point2f>& from, const std::vector<c
     dx.push_back(to[i].x - from[i].x);
     dy.push_back(to[i].y - from[i].y);
   }
-  return {1.0, 0.0, median(dx), 0.0, 1.0, median(dy)};
+  return {1.0, 0.0, upper_median(dx), 0.0, 1.0, upper_median(dy)};
 }
 
 // How a thing at rest at the object's depth seems to move.
