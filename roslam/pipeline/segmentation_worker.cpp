@@ -8,6 +8,8 @@
 #include <thread>
 #include <utility>
 
+#include "roslam/pipeline/thread_priority.hpp"
+
 namespace roslam {
 
 namespace {
@@ -42,7 +44,11 @@ SegmentationWorker::SegmentationWorker(std::shared_ptr<Segmenter> segmenter, Mod
   state_ = std::make_shared<State>();
   state_->segmenter = std::move(segmenter);
   // Detached, as nothing can end a thread that hangs in a network; all it touches is the state it shares.
-  std::thread([state = state_] { work(state); }).detach();
+  std::thread([state = state_, mode] {
+    // A picture more or less that is labelled matters less than a frame that is dropped.
+    if (mode == Mode::kRealTime) give_way_to_others();
+    work(state);
+  }).detach();
 }
 
 SegmentationWorker::~SegmentationWorker() {
