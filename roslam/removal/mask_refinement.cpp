@@ -16,27 +16,16 @@ struct DepthRange {
   cv::Mat largest;  // CV_32FC1 of cells; negative where no inside is near
 };
 
-// What lies so deep in a mask that a border off by that reach leaves it inside; of what is thinner, its core.
-cv::Mat core_of(const cv::Mat& mask_cells, int reach) {
-  cv::Mat bordered;  // so that the picture's border is no border of the mask
-  cv::copyMakeBorder(mask_cells, bordered, reach + 1, reach + 1, reach + 1, reach + 1, cv::BORDER_REPLICATE);
-  cv::Mat deep;  // in cells; a mask's outermost cells are 1 deep
-  cv::distanceTransform(bordered, deep, cv::DIST_C, 3);
-  deep = deep(cv::Rect({reach + 1, reach + 1}, mask_cells.size()));
-  cv::Mat deepest;
-  cv::dilate(deep, deepest, cv::getStructuringElement(cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1}));
-  return (mask_cells != 0) & (deep >= cv::min(deepest, reach + 1.0));
-}
-
 // Depth of the mask's inside near each cell.
 DepthRange inside_depth(const cv::Mat& mask_cells, const cv::Mat& depth_cells, int reach) {
-  const cv::Mat inside = core_of(mask_cells, reach);
+  cv::Mat inside;
+  cv::erode(mask_cells, inside, cv::Mat());
+  if (cv::countNonZero(inside) < cv::countNonZero(mask_cells) / 4) inside = mask_cells;  // a thin thing
   cv::Mat unknown = (inside == 0) | (depth_cells <= 0.0F);
   DepthRange range{depth_cells.clone(), depth_cells.clone()};
   range.least.setTo(std::numeric_limits<float>::infinity(), unknown);
   range.largest.setTo(-1.0F, unknown);
-  const int near = 2 * reach;  // a cell at the border is this far from the core of a mask that is too wide
-  const cv::Mat window = cv::getStructuringElement(cv::MORPH_RECT, {2 * near + 1, 2 * near + 1});
+  const cv::Mat window = cv::getStructuringElement(cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1});
   cv::erode(range.least, range.least, window);
   cv::dilate(range.largest, range.largest, window);
   return range;
