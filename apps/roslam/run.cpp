@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -27,7 +28,9 @@ struct RunArguments {
   std::string config;
   bool deterministic = false;
   bool real_time = false;
-  std::string model;    // weights in place of the shipped ones
+  std::string model;       // weights in place of the shipped ones
+  std::string vocabulary;  // words in place of the shipped ones
+  bool no_loops = false;
   std::string dynamic;  // empty: as the options say
   bool print_config = false;
   bool video = false;
@@ -71,6 +74,19 @@ std::shared_ptr<Segmenter> open_segmenter(const RunArguments& arguments, Options
   return std::make_shared<PspnetSegmenter>(file, options.segmenter);
 }
 
+// The words that places are recognised by; null where no loop is to be closed. Without them a flight is still
+// worth tracking.
+std::shared_ptr<const Vocabulary> open_vocabulary(const RunArguments& arguments, Options& options) {
+  if (!options.loop.enabled) return nullptr;
+  const std::filesystem::path file =
+      arguments.vocabulary.empty() ? shipped_vocabulary() : std::filesystem::path(arguments.vocabulary);
+  if (!file.empty()) return std::make_shared<const Vocabulary>(Vocabulary::load(file));
+  options.loop.enabled = false;
+  std::cerr << "note: models/roslam-orb.vocabulary: not found beside the program; no loop is closed. Install "
+               "it or name it with --vocabulary\n";
+  return nullptr;
+}
+
 void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder& folder) {
   const auto times = slam.times().summary();
   const std::size_t tracked = slam.trajectory().size();
@@ -88,6 +104,10 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
   for (const auto& [fault, count] : slam.labelling_faults()) {
     std::printf("note: %s (%zu times)\n", fault.c_str(), count);
   }
+  for (const auto& loop : slam.loops()) {
+    std::printf("loop: keyframe %u showed the place of keyframe %u again; it moved by %.3f m, %.2f degrees\n",
+                loop.keyframe.value, loop.place.value, loop.moved, loop.turned * 180.0 / M_PI);
+  }
   std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
               slam.map().landmark_count());
   if (const auto found = times.find("tracking"); found != times.end()) {
@@ -100,6 +120,7 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
 void execute(const RunArguments& arguments, const std::string& version) {
   Options options = arguments.config.empty() ? Options{} : read_options(arguments.config);
   if (!arguments.dynamic.empty()) options.removal = *removal_from(arguments.dynamic, options.removal);
+  if (arguments.no_loops) options.loop.enabled = false;
   if (arguments.print_config) {
     std::cout << options_to_yaml(options);
     require_written_output();
@@ -110,13 +131,16 @@ void execute(const RunArguments& arguments, const std::string& version) {
   if (!arguments.model.empty() && !options.removal.labels) {
     throw CLI::ValidationError("--model", "needs --dynamic labels or both");
   }
+  if (!arguments.vocabulary.empty() && !options.loop.enabled) {
+    throw CLI::ValidationError("--vocabulary", "needs loop.enabled");
+  }
   const InterruptWatcher interrupt;
   const auto source = open_source(arguments.source);
   const RunFolder folder(arguments.out);
   RunDescription description{arguments.source.name, arguments.source.camera, version, {}};
   const auto segmenter = open_segmenter(arguments, options, description.segmentation_model);
   Slam slam(source->camera(), options, arguments.real_time ? Mode::kRealTime : Mode::kDeterministic,
-            segmenter);
+            segmenter, open_vocabulary(arguments, options));
   std::optional<RemovalLog> log;
   RemovalLog::remove_old(folder.path());
   if (options.removal.is_on()) {
@@ -188,6 +212,9 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command->add_option(
       "--model", arguments->model,
       "Weights of the network that labels (ONNX), in place of those that come with the program");
+  command->add_option("--vocabulary", arguments->vocabulary,
+                      "Words that places are recognised by, in place of those that come with the program");
+  command->add_flag("--no-loops", arguments->no_loops, "Close no loops; the path is then as odometry has it");
   add_flight_options(*command, arguments->source);
   command->add_flag("--print-config", arguments->print_config, "Print the effective options and stop");
   command->add_flag("--video", arguments->video,

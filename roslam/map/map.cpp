@@ -122,13 +122,28 @@ LandmarkId Map::resolve(LandmarkId id) const {
   return id;
 }
 
-SE3 Map::T_camera_world(KeyframeId id) const {
+std::pair<KeyframeId, SE3> Map::T_camera_anchor(KeyframeId id) const {
   SE3 T_camera_anchor;
   while (find(id) == nullptr) {
     T_camera_anchor = T_camera_anchor * anchors_[id.index()].T_camera_anchor;
     id = anchors_[id.index()].keyframe;
   }
-  return T_camera_anchor * find(id)->T_camera_world;
+  return {id, T_camera_anchor};
+}
+
+SE3 Map::T_camera_world(KeyframeId id) const {
+  const auto [anchor, T_camera_anchor] = this->T_camera_anchor(id);
+  return T_camera_anchor * find(anchor)->T_camera_world;
+}
+
+std::vector<LoopClosure> Map::loops() const {
+  std::vector<LoopClosure> result;
+  for (const auto& loop : loops_) {
+    const auto [from, T_from_anchor] = T_camera_anchor(loop.from);
+    const auto [to, T_to_anchor] = T_camera_anchor(loop.to);
+    if (from != to) result.push_back({from, to, T_to_anchor.inverse() * loop.T_to_from * T_from_anchor});
+  }
+  return result;
 }
 
 void Map::refresh(LandmarkId id) {

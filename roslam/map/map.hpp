@@ -31,6 +31,13 @@ struct Observation {
   std::uint32_t point = 0;  ///< index into the keyframe's view
 };
 
+/// Two keyframes that were found to show one place, and how they lie to each other.
+struct LoopClosure {
+  KeyframeId from;
+  KeyframeId to;
+  SE3 T_to_from;
+};
+
 /// A point of the world.
 struct Landmark {
   LandmarkId id;
@@ -42,10 +49,10 @@ struct Landmark {
   float max_distance = 0.0F;              ///< metres, farthest
   std::vector<Observation> observations;  ///< in the order of keyframes
   KeyframeId created_by;
-  std::uint32_t predicted = 0;  ///< frames that should have seen it
-  std::uint32_t found = 0;      ///< frames that did
+  std::uint32_t predicted = 0;     ///< frames that should have seen it
+  std::uint32_t found = 0;         ///< frames that did
   std::uint32_t contradicted = 0;  ///< frames that saw it on something that moves, or saw through it
-  cv::Vec3b colour;             ///< BGR
+  cv::Vec3b colour;                ///< BGR
 };
 
 /// Keyframes, landmarks and who sees what. Data only: the algorithms live in tracking and mapping. Not thread
@@ -76,6 +83,19 @@ class Map {
   /// Moves all observations of one landmark to another and removes the first.
   void merge_landmarks(LandmarkId from, LandmarkId into);
 
+  /// Notes that two keyframes show one place.
+  void add_loop(KeyframeId from, KeyframeId to, const SE3& T_to_from) {
+    loops_.push_back({from, to, T_to_from});
+  }
+
+  /// All that were noted, between living keyframes: those of removed ones hang on their anchors.
+  std::vector<LoopClosure> loops() const;
+
+  /// Notes that keyframes moved that no landmark ties together, as after a loop. What was worked out on an
+  /// older state of the map does not fit it any more.
+  void note_correction() { ++corrections_; }
+  std::size_t corrections() const { return corrections_; }
+
   /// Nullptr if there is none, or no longer.
   Keyframe* find(KeyframeId id);
   const Keyframe* find(KeyframeId id) const;
@@ -84,6 +104,9 @@ class Map {
 
   /// The landmark that took over a merged one's observations; the id itself if it was never merged.
   LandmarkId resolve(LandmarkId id) const;
+
+  /// Pose of a keyframe relative to the living one that it hangs on: itself, unless it was removed.
+  std::pair<KeyframeId, SE3> T_camera_anchor(KeyframeId id) const;
 
   /// Pose of a keyframe, also of one that was removed.
   SE3 T_camera_world(KeyframeId id) const;
@@ -127,6 +150,8 @@ class Map {
   std::vector<Anchor> anchors_;                       // by keyframe id; where a removed keyframe's pose hangs
   std::vector<std::unique_ptr<Landmark>> landmarks_;  // by id; empty once removed
   std::vector<LandmarkId> merged_into_;               // by landmark id
+  std::vector<LoopClosure> loops_;
+  std::size_t corrections_ = 0;
   std::size_t keyframe_count_ = 0;
   std::size_t landmark_count_ = 0;
 };

@@ -59,14 +59,17 @@ void LocalMapper::process(KeyframeId keyframe, const std::function<bool()>& shou
 
 void LocalMapper::adjust_around(KeyframeId keyframe, const std::function<bool()>& should_stop) {
   LocalBundle local;
+  std::size_t corrections = 0;
   {
     const std::scoped_lock lock(map_mutex_);
+    corrections = map_.corrections();
     if (map_.keyframe_count() < 2) return;
     local = LocalBundle::around(map_, keyframe, settings_.noise, settings_.bundle);
   }
   const BundleSummary summary = adjust_bundle(camera_, local.problem, settings_.bundle, should_stop);
   if (!summary.is_usable) return;
   const std::scoped_lock lock(map_mutex_);
+  if (map_.corrections() != corrections) return;  // a loop moved the map meanwhile
   local.apply_to(map_, camera_);
 }
 

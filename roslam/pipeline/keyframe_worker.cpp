@@ -1,26 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/pipeline/mapping_worker.hpp"
+#include "roslam/pipeline/keyframe_worker.hpp"
+
+#include <utility>
 
 namespace roslam {
 
-MappingWorker::MappingWorker(LocalMapper& mapper, Mode mode, int queue_size)
-    : mapper_(mapper), mode_(mode), queue_size_(static_cast<std::size_t>(queue_size)) {
+KeyframeWorker::KeyframeWorker(Work work, Mode mode, int patience)
+    : work_(std::move(work)), mode_(mode), patience_(static_cast<std::size_t>(patience)) {
   if (mode_ == Mode::kRealTime) {
-    thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   }
 }
 
-bool MappingWorker::is_idle() const {
+bool KeyframeWorker::is_idle() const {
   const std::scoped_lock lock(mutex_);
   return queue_.empty() && !is_busy_;
 }
 
-bool MappingWorker::has_room() const {
+std::size_t KeyframeWorker::waiting() const {
   const std::scoped_lock lock(mutex_);
-  return queue_.size() < queue_size_;
+  return queue_.size();
 }
 
-void MappingWorker::submit(KeyframeId keyframe) {
+void KeyframeWorker::submit(KeyframeId keyframe) {
   if (mode_ == Mode::kDeterministic) {
     process(keyframe);
     return;
@@ -31,18 +33,18 @@ void MappingWorker::submit(KeyframeId keyframe) {
   changed_.notify_all();
 }
 
-void MappingWorker::drain() {
+void KeyframeWorker::drain() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return failure_ || (queue_.empty() && !is_busy_); });
   if (failure_) std::rethrow_exception(failure_);
 }
 
-StageTimes MappingWorker::times() const {
+StageTimes KeyframeWorker::times() const {
   const std::scoped_lock lock(mutex_);
   return times_;
 }
 
-void MappingWorker::work(const std::stop_token& stop) {
+void KeyframeWorker::run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [&] { return !queue_.empty(); })) {
     const KeyframeId keyframe = queue_.front();
@@ -63,20 +65,12 @@ void MappingWorker::work(const std::stop_token& stop) {
   }
 }
 
-void MappingWorker::process(KeyframeId keyframe) {
-  // The next keyframe matters more than the last step of refining this one.
-  const auto should_stop = [this] {
-    const std::scoped_lock lock(mutex_);
-    return !queue_.empty();
-  };
-  mapper_.process(keyframe, mode_ == Mode::kRealTime ? std::function<bool()>(should_stop) : nullptr);
-  const LocalMapper::Times& t = mapper_.times();
+void KeyframeWorker::process(KeyframeId keyframe) {
+  const auto should_stop = [this] { return waiting() >= patience_; };
+  StageTimes times;
+  work_(keyframe, mode_ == Mode::kRealTime ? ShouldStop(should_stop) : nullptr, times);
   const std::scoped_lock lock(mutex_);
-  times_.add("mapping.landmarks", t.landmarks);
-  times_.add("mapping.fusion", t.fusion);
-  times_.add("mapping.bundle_adjustment", t.bundle);
-  times_.add("mapping.culling", t.culling);
-  times_.add("mapping", t.landmarks + t.fusion + t.bundle + t.culling);
+  times_.add_all(times);
 }
 
 }  // namespace roslam

@@ -29,6 +29,10 @@ void Options::validate() const {
   fusion.validate();
   culling.validate();
   bundle.validate();
+  loop.validate();
+  place_check.validate();
+  loop_closer.validate();
+  pose_graph.validate();
   threads.validate();
 }
 
@@ -40,6 +44,10 @@ DynamicRemoval::Settings Options::removal_settings() const { return {removal, de
 
 LocalMapper::Settings Options::mapper_settings() const {
   return {landmarks, fusion, culling, bundle, matcher, noise};
+}
+
+LoopCloser::Settings Options::loop_settings() const {
+  return {loop, loop_closer, pose_graph, {place_check, relocaliser, matcher, pose, noise}, fusion, bundle};
 }
 
 }  // namespace roslam

@@ -7,6 +7,7 @@
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/geometry/reprojection.hpp"
+#include "roslam/loop/loop_closer.hpp"
 #include "roslam/mapping/local_mapper.hpp"
 #include "roslam/removal/dynamic_removal.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
@@ -47,6 +48,10 @@ struct Options {
   FusionOptions fusion;
   CullingOptions culling;
   BundleAdjustmentOptions bundle;
+  LoopDetectorOptions loop;
+  PlaceCheckOptions place_check;
+  LoopCloserOptions loop_closer;
+  PoseGraphOptions pose_graph;
   ThreadOptions threads;
 
   /// Throws OptionsError naming the first field out of range.
@@ -54,6 +59,7 @@ struct Options {
 
   Tracker::Settings tracker_settings() const;
   LocalMapper::Settings mapper_settings() const;
+  LoopCloser::Settings loop_settings() const;
   DynamicRemoval::Settings removal_settings() const;
 };
 

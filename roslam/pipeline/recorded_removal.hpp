@@ -26,7 +26,6 @@ class RecordedRemoval {
   /// Throws InputError naming the file that is missing or damaged, in run.json or descriptors.jsonl.
   explicit RecordedRemoval(const std::filesystem::path& run_folder);
 
-
   /// In effect in the run.
   const Options& options() const { return options_; }
 

@@ -9,6 +9,9 @@
 namespace roslam {
 
 namespace {
+// Keyframes that may wait for global bundle adjustment; while it runs no place is recognised.
+constexpr int kLoopPatience = 20;
+
 const Camera& validated(const Camera& camera) {
   camera.validate();
   return camera;
@@ -26,7 +29,8 @@ std::vector<float> level_scales(const OrbExtractor& extractor) {
 }
 }  // namespace
 
-Slam::Slam(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter)
+Slam::Slam(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,
+           std::shared_ptr<const Vocabulary> vocabulary)
     : camera_(validated(camera)),
       options_(validated(options)),
       mode_(mode),
@@ -37,7 +41,54 @@ Slam::Slam(const Camera& camera, const Options& options, Mode mode, std::shared_
       tracker_(camera, map_, options.tracker_settings()),
       keyframe_policy_(options.keyframes),
       mapper_(camera, map_, map_mutex_, options.mapper_settings()),
-      mapping_(mapper_, mode, options.threads.keyframe_queue) {}
+      closing_([this](auto&&... work) { close_loops(work...); }, mode, kLoopPatience),
+      mapping_([this](auto&&... work) { map_keyframe(work...); }, mode, 1) {
+  if (vocabulary == nullptr || !options_.loop.enabled) return;
+  places_.emplace(std::move(vocabulary));
+  loop_closer_.emplace(camera_, map_, *places_, map_mutex_, options_.loop_settings());
+}
+
+void Slam::map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,
+                        StageTimes& times) {
+  // The next keyframe matters more than the last step of refining this one.
+  mapper_.process(keyframe, should_stop);
+  const LocalMapper::Times& t = mapper_.times();
+  times.add("mapping.landmarks", t.landmarks);
+  times.add("mapping.fusion", t.fusion);
+  times.add("mapping.bundle_adjustment", t.bundle);
+  times.add("mapping.culling", t.culling);
+  times.add("mapping", t.landmarks + t.fusion + t.bundle + t.culling);
+  if (loop_closer_) closing_.submit(keyframe);
+}
+
+void Slam::close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,
+                       StageTimes& times) {
+  const std::size_t closed = loop_closer_->closed().size();
+  loop_closer_->process(keyframe, should_stop);
+  const LoopCloser::Times& t = loop_closer_->times();
+  times.add("loop.recognise", t.recognise);
+  if (loop_closer_->closed().size() == closed) return;
+  times.add("loop.correct", t.correct);
+  times.add("loop.fuse", t.fuse);
+  times.add("loop.bundle_adjustment", t.bundle);
+}
+
+std::vector<ClosedLoop> Slam::loops() const {
+  return loop_closer_ ? loop_closer_->closed() : std::vector<ClosedLoop>{};
+}
+
+std::size_t Slam::refused_loops() const { return loop_closer_ ? loop_closer_->refused() : 0; }
+
+// After a loop the world lies elsewhere than where removal remembers it. Called with the map's mutex held.
+void Slam::follow_correction() {
+  if (followed_corrections_ == map_.corrections()) return;
+  followed_corrections_ = map_.corrections();
+  const auto corrected = tracker_.last_pose();
+  if (corrected && last_T_camera_world_) {
+    removal_.move_world(corrected->inverse() * *last_T_camera_world_);
+    last_T_camera_world_ = corrected;
+  }
+}
 
 std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask) {
   if (!is_usable(frame)) return std::nullopt;
@@ -55,16 +106,21 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
       removed.empty() ? 0.0 : cv::countNonZero(removed) / static_cast<double>(removed.total());
 
   std::unique_lock map_lock(map_mutex_);
-  TrackedFrame tracked = tracker_.track(view, frame.timestamp, {result.removal.T_camera_world, hidden_share});
+  FrameHint hint{result.removal.T_camera_world, hidden_share};
+  if (followed_corrections_ != map_.corrections()) hint.T_camera_world.reset();  // of a world that is no more
+  follow_correction();
+  TrackedFrame tracked = tracker_.track(view, frame.timestamp, hint);
   tracked.hidden = count_hidden(tracked, removed);
   KeyframeId keyframe;
-  if (mapping_.has_room() && keyframe_policy_.promotes(tracked, map_, mapping_.is_idle())) {
+  const bool has_room = mapping_.waiting() < static_cast<std::size_t>(options_.threads.keyframe_queue);
+  if (has_room && keyframe_policy_.promotes(tracked, map_, mapping_.is_idle())) {
     keyframe = mapper_.insert(tracked, frame.index);
     keyframe_policy_.promoted(tracked);
     tracker_.promoted(keyframe);
     tracked.reference = keyframe;
   }
   record(tracked);
+  last_T_camera_world_ = tracked.T_camera_world ? tracked.T_camera_world : last_T_camera_world_;
   cull_contradicted(tracked, frame, result.removal);
   map_lock.unlock();
 
@@ -117,6 +173,7 @@ Removal Slam::find_movables(const Frame& frame, const cv::Mat& grey) {
   std::optional<SE3> predicted;
   {
     const std::scoped_lock lock(map_mutex_);
+    follow_correction();
     predicted = tracker_.predicted_pose(frame.timestamp);
   }
   const auto every = static_cast<std::size_t>(options_.removal.label_every);
@@ -204,7 +261,10 @@ void Slam::note_times(double removal, double extract, double total) {
   times_.add("tracking", total);
 }
 
-void Slam::finish() { mapping_.drain(); }
+void Slam::finish() {
+  mapping_.drain();
+  closing_.drain();
+}
 
 Trajectory Slam::trajectory() const {
   Trajectory result;
@@ -228,6 +288,7 @@ Trajectory Slam::keyframes() const {
 StageTimes Slam::times() const {
   StageTimes all = times_;
   all.add_all(mapping_.times());
+  all.add_all(closing_.times());
   all.add_all(segmentation_.times());
   return all;
 }

@@ -11,9 +11,10 @@
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/trajectory.hpp"
+#include "roslam/loop/loop_closer.hpp"
 #include "roslam/map/map.hpp"
 #include "roslam/mapping/local_mapper.hpp"
-#include "roslam/pipeline/mapping_worker.hpp"
+#include "roslam/pipeline/keyframe_worker.hpp"
 #include "roslam/pipeline/options.hpp"
 #include "roslam/pipeline/segmentation_worker.hpp"
 #include "roslam/pipeline/statistics.hpp"
@@ -42,16 +43,18 @@ struct FrameResult {
 /// The pipeline: frames in, trajectory and map out.
 class Slam {
  public:
-  /// segmenter: labels frames on a thread of its own, null: none. Throws CalibrationError or OptionsError.
+  /// segmenter: labels frames on a thread of its own, null: none. vocabulary: places are recognised by its
+  /// words, null: no loop is closed. Throws CalibrationError or OptionsError.
   Slam(const Camera& camera, const Options& options = {}, Mode mode = Mode::kDeterministic,
-       std::shared_ptr<Segmenter> segmenter = nullptr);
+       std::shared_ptr<Segmenter> segmenter = nullptr,
+       std::shared_ptr<const Vocabulary> vocabulary = nullptr);
 
   /// Tracks a frame and, if it becomes a keyframe, maps it (in real-time mode: on another thread). mask:
   /// empty, or CV_8UC1 of the frame's size, nonzero where nothing may be used, beside what is found to move.
   /// Frames that cannot be used (wrong size or type, time not increasing) give nothing and are counted.
   std::optional<FrameResult> process(const Frame& frame, const cv::Mat& mask = {});
 
-  /// Waits for the mapper. Call before reading results.
+  /// Waits for mapping and loop closing. Call before reading results.
   void finish();
 
   /// Poses of all tracked frames, with every later correction of the map, in the order of time.
@@ -62,6 +65,10 @@ class Slam {
 
   /// The map. In real-time mode only after finish().
   const Map& map() const { return map_; }
+
+  /// Loops that were closed so far, and how many were refused. In real-time mode only after finish().
+  std::vector<ClosedLoop> loops() const;
+  std::size_t refused_loops() const;
 
   const Camera& camera() const { return camera_; }
   const Options& options() const { return options_; }
@@ -86,6 +93,9 @@ class Slam {
     SE3 T_camera_reference;
   };
 
+  void map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
+  void close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
+  void follow_correction();
   bool is_usable(const Frame& frame);
   Removal find_movables(const Frame& frame, const cv::Mat& grey);
   std::shared_ptr<const ObservedFrame> extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& mask,
@@ -107,13 +117,20 @@ class Slam {
   Tracker tracker_;
   KeyframePolicy keyframe_policy_;
   LocalMapper mapper_;
+  std::optional<PlaceIndex> places_;
+  std::optional<LoopCloser> loop_closer_;
   std::vector<Record> records_;
   std::map<TrackingState, std::size_t> frames_by_state_;
   std::map<std::string, std::size_t> rejected_;
   std::optional<double> last_timestamp_;
   int last_inliers_ = 0;
   StageTimes times_;
-  MappingWorker mapping_;  // last, so that its thread stops before what it uses goes away
+  // Where the camera was taken to be in the world as it was by then.
+  std::optional<SE3> last_T_camera_world_;
+  std::size_t followed_corrections_ = 0;
+  // Last, so that their threads stop before what they use goes away.
+  KeyframeWorker closing_;
+  KeyframeWorker mapping_;
 };
 
 }  // namespace roslam

@@ -251,6 +251,13 @@ Removal DynamicRemoval::finished(const CellScene& scene) {
   return removal;
 }
 
+void DynamicRemoval::move_world(const SE3& T_new_old) {
+  for (auto& past : past_) {
+    if (past.T_camera_world) past.T_camera_world = *past.T_camera_world * T_new_old.inverse();
+  }
+  history_.move_world(T_new_old);
+}
+
 void DynamicRemoval::remember(const std::optional<SE3>& T_camera_world, std::vector<cv::Point2f> points,
                               std::vector<cv::Point2f> removed_points) {
   current_.T_camera_world = T_camera_world;

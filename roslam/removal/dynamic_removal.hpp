@@ -60,6 +60,9 @@ class DynamicRemoval {
   void remember(const std::optional<SE3>& T_camera_world, std::vector<cv::Point2f> points,
                 std::vector<cv::Point2f> removed_points);
 
+  /// Tells that the map was corrected: what was remembered lies elsewhere now.
+  void move_world(const SE3& T_new_old);
+
   /// Labels that could not be used so far, by reason in words.
   const std::map<std::string, std::size_t>& faults() const { return faults_; }
   std::size_t flickers() const { return memory_.flickers(); }

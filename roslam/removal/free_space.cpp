@@ -103,6 +103,10 @@ FreeSpaceEvidence FreeSpaceHistory::examine(const CellGrid& grid, const cv::Mat&
   return evidence;
 }
 
+void FreeSpaceHistory::move_world(const SE3& T_new_old) {
+  for (auto& view : views_) view.T_camera_world = view.T_camera_world * T_new_old.inverse();
+}
+
 void FreeSpaceHistory::add(const cv::Mat& depth, const SE3& T_camera_world, double timestamp) {
   while (!views_.empty() && timestamp - views_.front().timestamp > options_.history) views_.pop_front();
   if (!views_.empty() && timestamp - views_.back().timestamp < options_.history_interval) return;

@@ -43,6 +43,9 @@ class FreeSpaceHistory {
   /// Keeps a frame if it is time for another. depth: of cells.
   void add(const cv::Mat& depth, const SE3& T_camera_world, double timestamp);
 
+  /// Takes over a correction of the world: the same points, elsewhere.
+  void move_world(const SE3& T_new_old);
+
   bool empty() const { return views_.empty(); }
 
  private:

@@ -11,6 +11,7 @@
 #include "roslam/error.hpp"
 #include "roslam/geometry/stopwatch.hpp"
 #include "roslam/semantics/score_labels.hpp"
+#include "roslam/shipped_file.hpp"
 
 namespace roslam {
 
@@ -90,17 +91,7 @@ Segmentation PspnetSegmenter::segment(const cv::Mat& image) {
   return result;
 }
 
-std::filesystem::path shipped_segmentation_model() {
-  constexpr auto kName = "roslam-pspnet.onnx";
-  std::error_code error;
-  const auto folder = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
-  for (const char* models :
-       {"models", "../models", "../../models", "../../../models", "../share/roslam/models"}) {
-    const auto file = folder / models / kName;
-    if (std::filesystem::is_regular_file(file, error)) return file.lexically_normal();
-  }
-  return {};
-}
+std::filesystem::path shipped_segmentation_model() { return shipped_file("roslam-pspnet.onnx"); }
 
 ModelError missing_segmentation_model() {
   return ModelError(

@@ -34,21 +34,21 @@ std::optional<RelocalisedPose> Relocaliser::find(const Map& map, const ObservedF
   const auto tries = std::min(static_cast<std::size_t>(options_.candidates), keyframes.size());
   for (std::size_t i = 0; i < tries; ++i) {
     const Keyframe& keyframe = *map.find(keyframes[(next_ + i) % keyframes.size()]);
-    if (auto pose = try_keyframe(map, keyframe, frame, camera)) return pose;
+    if (auto pose = recognise(map, keyframe, frame, camera, options_, matcher_)) return pose;
   }
   if (search_all) next_ = (next_ + tries) % keyframes.size();
   return std::nullopt;
 }
 
-std::optional<RelocalisedPose> Relocaliser::try_keyframe(const Map& map, const Keyframe& keyframe,
-                                                         const ObservedFrame& frame,
-                                                         const Camera& camera) const {
+std::optional<RelocalisedPose> recognise(const Map& map, const Keyframe& keyframe, const ObservedFrame& frame,
+                                         const Camera& camera, const RelocaliserOptions& options,
+                                         const MatcherOptions& matcher) {
   std::vector<std::uint32_t> known;
   for (std::uint32_t i = 0; i < keyframe.landmarks.size(); ++i) {
     if (keyframe.landmarks[i].is_valid()) known.push_back(i);
   }
-  const auto matches = match_descriptors(*keyframe.view, known, frame, matcher_);
-  if (static_cast<int>(matches.size()) < options_.min_matches) return std::nullopt;
+  const auto matches = match_descriptors(*keyframe.view, known, frame, matcher);
+  if (static_cast<int>(matches.size()) < options.min_matches) return std::nullopt;
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> pixels;
   for (const auto& [in_keyframe, in_frame] : matches) {
@@ -64,12 +64,12 @@ std::optional<RelocalisedPose> Relocaliser::try_keyframe(const Map& map, const K
   bool found = false;
   try {
     found = cv::solvePnPRansac(points, pixels, matrix, cv::noArray(), rotation, translation, false,
-                               options_.iterations, static_cast<float>(options_.max_error), kConfidence,
+                               options.iterations, static_cast<float>(options.max_error), kConfidence,
                                inliers, cv::SOLVEPNP_P3P);
   } catch (const cv::Exception&) {  // a degenerate sample
     return std::nullopt;
   }
-  if (!found || static_cast<int>(inliers.size()) < options_.min_inliers) return std::nullopt;
+  if (!found || static_cast<int>(inliers.size()) < options.min_inliers) return std::nullopt;
   RelocalisedPose result{from_rodrigues(rotation, translation), std::vector<LandmarkId>(frame.size()),
                          keyframe.id};
   if (!result.T_camera_world.is_finite()) return std::nullopt;

@@ -29,8 +29,13 @@ struct RelocalisedPose {
   KeyframeId keyframe;                ///< the one that was recognised
 };
 
-/// Recovers the pose of a frame from descriptor matches with the landmarks of single keyframes: P3P in
-/// RANSAC.
+/// The pose of a frame from descriptor matches with the landmarks of one keyframe: P3P in RANSAC. Nothing if
+/// there are too few, or too few that agree.
+std::optional<RelocalisedPose> recognise(const Map& map, const Keyframe& keyframe, const ObservedFrame& frame,
+                                         const Camera& camera, const RelocaliserOptions& options,
+                                         const MatcherOptions& matcher);
+
+/// Recovers the pose of a frame without knowing where the camera was.
 class Relocaliser {
  public:
   Relocaliser(const RelocaliserOptions& options, const MatcherOptions& matcher)
@@ -42,9 +47,6 @@ class Relocaliser {
                                       bool search_all);
 
  private:
-  std::optional<RelocalisedPose> try_keyframe(const Map& map, const Keyframe& keyframe,
-                                              const ObservedFrame& frame, const Camera& camera) const;
-
   RelocaliserOptions options_;
   MatcherOptions matcher_;
   std::size_t next_ = 0;  // how far search_all has come, counted from the newest keyframe

@@ -133,13 +133,13 @@ bool Tracker::follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_wor
   return matched && refine_with_local_map(frame, last_.reference);
 }
 
-SE3 Tracker::last_pose() const {
-  return last_.reference.is_valid() ? T_last_reference_ * map_.T_camera_world(last_.reference)
-                                    : *last_.T_camera_world;
+std::optional<SE3> Tracker::last_pose() const {
+  if (!last_.reference.is_valid()) return last_.T_camera_world;
+  return T_last_reference_ * map_.T_camera_world(last_.reference);
 }
 
 SE3 Tracker::predict_pose(double timestamp) const {
-  const SE3 last = last_pose();
+  const SE3 last = *last_pose();
   if (!velocity_) return last;
   // Over more than some frames no motion goes on as it was.
   constexpr double kSteady = 0.1;  // seconds
@@ -153,7 +153,7 @@ SE3 Tracker::predict_pose(double timestamp) const {
 bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor) {
   const Stopwatch watch;
   frame.landmarks.assign(frame.view->size(), {});
-  const SE3 T_world_last = last_pose().inverse();
+  const SE3 T_world_last = last_pose()->inverse();
   const ObservedFrame& last = *last_.view;
   std::vector<Eigen::Vector3d> positions;
   std::vector<std::uint32_t> points;
@@ -342,7 +342,7 @@ void Tracker::remember(const TrackedFrame& frame) {
   const double elapsed = frame.timestamp - last_.timestamp;
   constexpr double kMaxGap = 0.5;  // seconds; after a longer gap the old motion tells nothing
   if (last_.view != nullptr && elapsed > 0.0 && elapsed < kMaxGap) {
-    velocity_ = (*frame.T_camera_world * last_pose().inverse()).log() / elapsed;
+    velocity_ = (*frame.T_camera_world * last_pose()->inverse()).log() / elapsed;
   } else {
     velocity_.reset();
   }

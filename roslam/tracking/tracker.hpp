@@ -89,6 +89,10 @@ class Tracker {
   /// Tells that the frame tracked last became this keyframe (its landmarks are taken over).
   void promoted(KeyframeId keyframe);
 
+  /// T_camera_world of the last frame whose pose was known, in the world as the map has it now; nothing
+  /// before the first keyframe.
+  std::optional<SE3> last_pose() const;
+
   TrackingState state() const { return state_; }
 
   /// The landmarks around the last frame, some of which may be gone by now.
@@ -118,7 +122,6 @@ class Tracker {
   void match_local_landmarks(TrackedFrame& frame);
   void count_predictions(const TrackedFrame& frame);
   SE3 predict_pose(double timestamp) const;
-  SE3 last_pose() const;
   void remember(const TrackedFrame& frame);
 
   Camera camera_;

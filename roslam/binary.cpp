@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/binary.hpp"
+
+#include <zlib.h>
+
+#include <fstream>
+#include <system_error>
+
+#include "roslam/error.hpp"
+#include "roslam/write_file.hpp"
+
+namespace roslam {
+
+namespace {
+constexpr std::size_t kMagic = 8;
+constexpr std::size_t kHeader = kMagic + 4 + 8 + 4;
+
+std::uint32_t crc(std::string_view bytes) {
+  return static_cast<std::uint32_t>(
+      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<z_size_t>(bytes.size())));
+}
+
+std::string megabytes(std::uintmax_t bytes) { return std::to_string(bytes / (1024 * 1024)) + " MB"; }
+}  // namespace
+
+std::string_view BinaryReader::get_bytes(std::size_t count) {
+  if (count > left()) fail("it ends too early");
+  const std::string_view result = bytes_.substr(at_, count);
+  at_ += count;
+  return result;
+}
+
+std::string_view BinaryReader::get_text() { return get_bytes(get_count(1)); }
+
+std::size_t BinaryReader::get_count(std::size_t bytes_each) {
+  const auto count = static_cast<std::size_t>(get<std::uint32_t>());
+  if (count > left() / bytes_each) fail("it names more items than it holds");
+  return count;
+}
+
+void BinaryReader::fail(const std::string& why) const {
+  throw InputError(name_ + ": damaged, " + why + "; make or fetch it again");
+}
+
+void write_binary(const std::filesystem::path& file, const BinaryFormat& format, std::string_view content) {
+  BinaryWriter whole;
+  whole.put_bytes(format.magic);
+  whole.put(format.version);
+  whole.put(static_cast<std::uint64_t>(content.size()));
+  whole.put(crc(content));
+  whole.put_bytes(content);
+  std::filesystem::path part = file;
+  part += ".part";
+  std::error_code error;
+  try {
+    write_file(part, whole.bytes());
+  } catch (...) {
+    std::filesystem::remove(part, error);
+    throw;
+  }
+  std::filesystem::rename(part, file, error);
+  if (!error) return;
+  const std::string reason = error.message();
+  std::filesystem::remove(part, error);
+  throw OutputError(file.string() + ": cannot be replaced (" + reason + "); choose another name");
+}
+
+std::string read_binary(const std::filesystem::path& file, const BinaryFormat& format) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) {
+    throw InputError(file.string() + ": no such file; give the path of " + std::string(format.what));
+  }
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (error) throw InputError(file.string() + ": cannot be read (" + error.message() + ")");
+  if (size > format.max_bytes + kHeader) {
+    throw InputError(file.string() + ": " + megabytes(size) + ", more than " + std::string(format.what) +
+                     " may have (" + megabytes(format.max_bytes) + "); give another file");
+  }
+  std::string bytes(size, '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(bytes.data(), static_cast<std::streamsize>(size));
+  if (!in) throw InputError(file.string() + ": cannot be read; check its permissions and the disk");
+  return std::string(check_binary(bytes, format, file.string()));
+}
+
+std::string_view check_binary(std::string_view bytes, const BinaryFormat& format, const std::string& name) {
+  if (bytes.empty()) throw InputError(name + ": empty; give the path of " + std::string(format.what));
+  if (bytes.substr(0, kMagic) != format.magic.substr(0, std::min(bytes.size(), kMagic))) {
+    throw InputError(name + ": not " + std::string(format.what) + " of RO-SLAM; give another file");
+  }
+  BinaryReader header(bytes, name);
+  header.get_bytes(kMagic);
+  if (const auto version = header.get<std::uint32_t>(); version != format.version) {
+    throw InputError(name + ": written in version " + std::to_string(version) + " of the format, this " +
+                     "program reads version " + std::to_string(format.version) +
+                     "; make it again with this program");
+  }
+  const auto size = header.get<std::uint64_t>();
+  const auto expected = header.get<std::uint32_t>();
+  if (size != header.left()) header.fail("it is not as long as it should be");
+  const std::string_view content = header.get_bytes(header.left());
+  if (crc(content) != expected) header.fail("its checksum does not match");
+  return content;
+}
+
+}  // namespace roslam

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/loop/global_bundle.hpp"
+
+#include <algorithm>
+
+namespace roslam {
+
+namespace {
+constexpr std::size_t kAtOnce = 2000;  // landmarks read under one lock
+}
+
+GlobalBundle GlobalBundle::of(const Map& map, std::mutex& map_mutex, const MeasurementNoise& noise) {
+  GlobalBundle result;
+  std::vector<std::size_t> pose_of;
+  std::vector<LandmarkId> candidates;
+  {
+    const std::scoped_lock lock(map_mutex);
+    pose_of.resize(map.keyframe_slots());
+    for (const KeyframeId id : map.keyframe_ids()) {
+      pose_of[id.index()] = result.keyframes.size();
+      result.problem.poses.push_back({map.find(id)->T_camera_world, result.keyframes.empty()});
+      result.keyframes.push_back(id);
+    }
+    candidates = map.landmark_ids();
+  }
+  std::vector<bool> is_in(pose_of.size(), false);
+  for (const KeyframeId id : result.keyframes) is_in[id.index()] = true;
+  for (std::size_t begin = 0; begin < candidates.size(); begin += kAtOnce) {
+    const std::scoped_lock lock(map_mutex);
+    for (std::size_t i = begin; i < std::min(begin + kAtOnce, candidates.size()); ++i) {
+      const Landmark* landmark = map.find(candidates[i]);
+      // Seen once only, a landmark says nothing about the poses.
+      if (landmark == nullptr || landmark->observations.size() < 2) continue;
+      for (const auto& observation : landmark->observations) {
+        const std::size_t k = observation.keyframe.index();
+        if (k >= is_in.size() || !is_in[k]) continue;  // came since
+        const ObservedFrame& view = *map.find(observation.keyframe)->view;
+        result.problem.terms.push_back(
+            {pose_of[k], result.landmarks.size(), map.measurement(view, observation.point, noise)});
+      }
+      result.problem.points.push_back(landmark->position);
+      result.landmarks.push_back(candidates[i]);
+    }
+  }
+  return result;
+}
+
+MapCorrection GlobalBundle::correction(const BundleProblem& before) const {
+  MapCorrection result;
+  for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    result.T_old_new[keyframes[i]] =
+        before.poses[i].T_camera_world.inverse() * problem.poses[i].T_camera_world;
+  }
+  for (std::size_t p = 0; p < landmarks.size(); ++p) {
+    result.positions.emplace_hint(result.positions.end(), landmarks[p], problem.points[p]);
+  }
+  return result;
+}
+
+}  // namespace roslam
