@@ -85,14 +85,18 @@ TEST_F(DynamicRun, WithoutWeightsItSaysOnceThatNothingIsRemoved) {
   const auto run_alone = [&](const std::string& arguments) {
     return shell_in(scratch_, "alone/roslam run data --quiet --camera simulated --out run " + arguments);
   };
-  const Outcome outcome = run_alone("--dynamic labels");
+  const Outcome outcome = run_alone("--dynamic labels --no-loops");
   EXPECT_EQ(outcome.code, 0) << outcome.error;
   EXPECT_NE(outcome.error.find("roslam-pspnet.onnx: not found"), std::string::npos) << outcome.error;
   EXPECT_NE(outcome.error.find("not removed"), std::string::npos) << outcome.error;
   EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
   EXPECT_EQ(report()["dynamic"]["mode"], "none");
   EXPECT_EQ(trajectory().size(), kFrames);
-  EXPECT_EQ(run_alone("--dynamic none").error, "");
+  EXPECT_EQ(run_alone("--dynamic none --no-loops").error, "");
+  const Outcome without_words = run_alone("--dynamic none");
+  EXPECT_EQ(without_words.code, 0);
+  EXPECT_NE(without_words.error.find("roslam-orb.vocabulary: not found"), std::string::npos);
+  EXPECT_EQ(std::count(without_words.error.begin(), without_words.error.end(), '\n'), 1);
 }
 
 }  // namespace
