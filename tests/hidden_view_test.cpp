@@ -210,7 +210,7 @@ TEST_F(HiddenTracker, PredictionsSurviveAPlaceThatIsRecognisedButNotConfirmed) {
   // too little to tell.
   const auto scrap = view(0, {0, 430, 640, 50}, 50);
   const RelocaliserOptions options;
-  const auto place = Relocaliser(options, MatcherOptions()).find(map_, *scrap, camera_, false);
+  const auto place = Relocaliser(options, MatcherOptions()).find(map_, *scrap, camera_, {}, false);
   ASSERT_TRUE(place);
   ASSERT_EQ(place->keyframe, map_.keyframe_ids().front());
   for (std::size_t i = kLast + 1; i < kLast + 4; ++i) {

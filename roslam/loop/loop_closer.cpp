@@ -57,8 +57,19 @@ std::optional<Loop> LoopCloser::recognise(KeyframeId keyframe) {
   }
   BagOfWords bag = places_.describe(*view);
   const std::scoped_lock lock(map_mutex_);
+  forget_removed();
   places_.add(keyframe, std::move(bag));
+  indexed_.push_back(keyframe);
   return detector_.detect(map_, places_, keyframe);
+}
+
+// So that the index grows with the map, not with time. Called with the mutex held.
+void LoopCloser::forget_removed() {
+  std::erase_if(indexed_, [&](KeyframeId id) {
+    if (map_.find(id) != nullptr) return false;
+    places_.remove(id);
+    return true;
+  });
 }
 
 bool LoopCloser::straighten(const Loop& loop, const std::function<bool()>& should_stop) {

@@ -71,6 +71,7 @@ class LoopCloser {
 
  private:
   std::optional<Loop> recognise(KeyframeId keyframe);
+  void forget_removed();
   bool straighten(const Loop& loop, const std::function<bool()>& should_stop);
   void fuse(const Loop& loop);
   void adjust_all(const std::function<bool()>& should_stop);
@@ -81,6 +82,7 @@ class LoopCloser {
   std::mutex& map_mutex_;
   Settings settings_;
   LoopDetector detector_;
+  std::vector<KeyframeId> indexed_;  // keyframes in the index
   std::vector<ClosedLoop> closed_;
   std::size_t refused_ = 0;
   Times times_;

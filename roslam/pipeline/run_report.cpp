@@ -110,6 +110,18 @@ Json dynamic_json(const Slam& slam, const RunSummary& summary, const RunDescript
   return json;
 }
 
+Json loops_json(const Slam& slam) {
+  Json json{{"closed", Json::array()}, {"refused", slam.refused_loops()}};
+  for (const auto& loop : slam.loops()) {
+    json["closed"].push_back({{"keyframe", loop.keyframe.value},
+                              {"place", loop.place.value},
+                              {"moved_metres", rounded(loop.moved, 4)},
+                              {"turned_degrees", rounded(loop.turned * 180.0 / M_PI, 3)},
+                              {"matches", loop.matches}});
+  }
+  return json;
+}
+
 double path_length(const Trajectory& trajectory) {
   double length = 0.0;
   for (std::size_t i = 1; i < trajectory.size(); ++i) {
@@ -132,6 +144,7 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   json["error"] = failure_json(summary.failure);
   json["frames"] = frames_json(slam, summary, source);
   json["dynamic"] = dynamic_json(slam, summary, description);
+  json["loops"] = loops_json(slam);
   json["keyframes"] = slam.map().keyframe_count();
   json["landmarks"] = slam.map().landmark_count();
   json["path_length_metres"] = rounded(path_length(slam.trajectory()), 3);

@@ -79,6 +79,15 @@ std::vector<ClosedLoop> Slam::loops() const {
 
 std::size_t Slam::refused_loops() const { return loop_closer_ ? loop_closer_->refused() : 0; }
 
+// Called with the map's mutex held.
+std::vector<KeyframeId> Slam::similar_keyframes(const ObservedFrame& view) const {
+  std::vector<KeyframeId> result;
+  if (!places_) return result;
+  const auto lives = [this](KeyframeId id) { return map_.find(id) != nullptr; };
+  for (const auto& found : places_->similar(places_->describe(view), lives)) result.push_back(found.keyframe);
+  return result;
+}
+
 // After a loop the world lies elsewhere than where removal remembers it. Called with the map's mutex held.
 void Slam::follow_correction() {
   if (followed_corrections_ == map_.corrections()) return;
@@ -106,7 +115,7 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
       removed.empty() ? 0.0 : cv::countNonZero(removed) / static_cast<double>(removed.total());
 
   std::unique_lock map_lock(map_mutex_);
-  FrameHint hint{result.removal.T_camera_world, hidden_share};
+  FrameHint hint{result.removal.T_camera_world, hidden_share, [&] { return similar_keyframes(*view); }};
   if (followed_corrections_ != map_.corrections()) hint.T_camera_world.reset();  // of a world that is no more
   follow_correction();
   TrackedFrame tracked = tracker_.track(view, frame.timestamp, hint);

@@ -95,6 +95,7 @@ class Slam {
 
   void map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   void close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
+  std::vector<KeyframeId> similar_keyframes(const ObservedFrame& view) const;
   void follow_correction();
   bool is_usable(const Frame& frame);
   Removal find_movables(const Frame& frame, const cv::Mat& grey);

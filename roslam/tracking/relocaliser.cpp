@@ -26,7 +26,14 @@ void RelocaliserOptions::validate() const {
 }
 
 std::optional<RelocalisedPose> Relocaliser::find(const Map& map, const ObservedFrame& frame,
-                                                 const Camera& camera, bool search_all) {
+                                                 const Camera& camera, std::span<const KeyframeId> similar,
+                                                 bool search_all) {
+  for (const KeyframeId id :
+       similar.first(std::min(similar.size(), static_cast<std::size_t>(options_.candidates)))) {
+    const Keyframe* keyframe = map.find(id);
+    if (keyframe == nullptr) continue;
+    if (auto pose = recognise(map, *keyframe, frame, camera, options_, matcher_)) return pose;
+  }
   std::vector<KeyframeId> keyframes = map.keyframe_ids();
   std::reverse(keyframes.begin(), keyframes.end());
   if (keyframes.empty()) return std::nullopt;

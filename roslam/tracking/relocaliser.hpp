@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "roslam/features/observed_frame.hpp"
@@ -41,10 +42,10 @@ class Relocaliser {
   Relocaliser(const RelocaliserOptions& options, const MatcherOptions& matcher)
       : options_(options), matcher_(matcher) {}
 
-  /// Tries the newest keyframes first; with search_all, works its way through all keyframes from call to
-  /// call.
+  /// Tries the keyframes that look like the frame, best first, as many as options say; then the newest, as
+  /// many; with search_all in place of these all keyframes, a few from call to call.
   std::optional<RelocalisedPose> find(const Map& map, const ObservedFrame& frame, const Camera& camera,
-                                      bool search_all);
+                                      std::span<const KeyframeId> similar, bool search_all);
 
  private:
   RelocaliserOptions options_;

@@ -82,7 +82,7 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   if (map_.keyframe_count() == 0) return initialise(std::move(frame));
 
   const bool was_known = state_ == TrackingState::kTracking || state_ == TrackingState::kPredicted;
-  const bool found = (was_known && follow(frame, hint.T_camera_world)) || relocalise(frame);
+  const bool found = (was_known && follow(frame, hint.T_camera_world)) || relocalise(frame, hint);
   if (found) {
     state_ = TrackingState::kTracking;
     frames_lost_ = 0;
@@ -317,10 +317,11 @@ bool Tracker::predict_hidden(TrackedFrame& frame, const FrameHint& hint) {
   return true;
 }
 
-bool Tracker::relocalise(TrackedFrame& frame) {
+bool Tracker::relocalise(TrackedFrame& frame, const FrameHint& hint) {
   const Stopwatch watch;
-  const auto found =
-      relocaliser_.find(map_, *frame.view, camera_, frames_lost_ >= settings_.tracker.recently_lost_frames);
+  const auto similar = hint.similar_keyframes ? hint.similar_keyframes() : std::vector<KeyframeId>{};
+  const auto found = relocaliser_.find(map_, *frame.view, camera_, similar,
+                                       frames_lost_ >= settings_.tracker.recently_lost_frames);
   times_.relocalise += watch.seconds();
   if (!found) return false;
   frame.T_camera_world = found->T_camera_world;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -48,6 +49,9 @@ struct TrackerOptions {
 struct FrameHint {
   std::optional<SE3> T_camera_world;  ///< a better guess than predicted_pose(), if there is one
   double hidden_share = 0.0;          ///< of the picture, hidden by what moves
+
+  /// Keyframes that look like the frame, best first; asked for only if the tracker is lost. May be empty.
+  std::function<std::vector<KeyframeId>()> similar_keyframes = {};
 };
 
 /// What tracking found out about a frame.
@@ -114,7 +118,7 @@ class Tracker {
   bool match_reference(TrackedFrame& frame);
   bool refine_with_local_map(TrackedFrame& frame, KeyframeId near);
   bool predict_hidden(TrackedFrame& frame, const FrameHint& hint);
-  bool relocalise(TrackedFrame& frame);
+  bool relocalise(TrackedFrame& frame, const FrameHint& hint);
   bool estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
                 const std::vector<std::uint32_t>& points, int min_inliers);
   bool first_estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
