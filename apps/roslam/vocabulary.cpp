@@ -15,7 +15,6 @@
 #include "apps/roslam/output.hpp"
 #include "apps/roslam/progress.hpp"
 #include "roslam/error.hpp"
-#include "roslam/evaluation/markdown_table.hpp"
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/sources/picture_source.hpp"
 
@@ -58,7 +57,7 @@ void train(const TrainArguments& arguments) {
   const auto source = open_pictures({arguments.inputs.begin(), arguments.inputs.end()});
   const Pictures pictures = describe_all(arguments, *source, interrupt.token());
   if (interrupt.token().stop_requested()) throw InputError("interrupted; no vocabulary was written");
-  Vocabulary vocabulary = [&] {
+  const Vocabulary vocabulary = [&] {
     constexpr std::size_t kSteps = 1000;
     Progress progress(kSteps, arguments.quiet || arguments.json);
     return Vocabulary::train(pictures, arguments.options, [&](double share) {
@@ -89,9 +88,7 @@ void add_train_command(CLI::App& vocabulary) {
       "Example:\n"
       "  roslam vocabulary train flights/rgb photographs --out my_vocabulary.bin\n"
       "A thousand pictures of what the camera will see make a good one. The same pictures, options and seed "
-      "make the\nsame file. Maps remember the vocabulary they were made with and are sorted anew where "
-      "another is "
-      "used.");
+      "make the\nsame file.");
   command
       ->add_option("IMAGES", arguments->inputs,
                    "Pictures, folders of pictures, TUM RGB-D folders, or one video")

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/loop/loop_closer.hpp"
 
-#include <cmath>
 #include <utility>
 
 #include "roslam/error.hpp"

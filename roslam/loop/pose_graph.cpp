@@ -9,6 +9,7 @@
 #include <string>
 
 #include "roslam/error.hpp"
+#include "roslam/mapping/stop_callback.hpp"
 
 namespace roslam {
 
@@ -81,17 +82,6 @@ void take_over(const Parameters& parameters, PoseGraph::Node& node) {
   node.T_node_world = SE3(so3_exp(omega) * node.T_node_world.rotation(), translation);
   node.scale = std::exp(parameters.log_scale);
 }
-
-class StopCallback : public ceres::IterationCallback {
- public:
-  explicit StopCallback(const std::function<bool()>& should_stop) : should_stop_(should_stop) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-    return should_stop_() ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
-  }
-
- private:
-  const std::function<bool()>& should_stop_;
-};
 }  // namespace
 
 void PoseGraphOptions::validate() const {

@@ -9,21 +9,11 @@
 
 #include "roslam/error.hpp"
 #include "roslam/mapping/bundle_cost.hpp"
+#include "roslam/mapping/stop_callback.hpp"
 
 namespace roslam {
 
 namespace {
-class StopCallback : public ceres::IterationCallback {
- public:
-  explicit StopCallback(const std::function<bool()>& should_stop) : should_stop_(should_stop) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-    return should_stop_() ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
-  }
-
- private:
-  const std::function<bool()>& should_stop_;
-};
-
 ceres::Solver::Options solver_options(const BundleAdjustmentOptions& options) {
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_SCHUR;
