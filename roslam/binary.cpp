@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/binary.hpp"
 
+#include <fcntl.h>
+#include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <system_error>
 
@@ -19,6 +22,16 @@ constexpr std::size_t kHeader = kMagic + 4 + 8 + 4;
 std::uint32_t crc(std::string_view bytes) {
   return static_cast<std::uint32_t>(
       crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<z_size_t>(bytes.size())));
+}
+
+// So that no power cut leaves a new name on bytes that were never written.
+void flush_to_disk(const std::filesystem::path& file) {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  const bool is_written = fsync(descriptor) == 0 || errno == EINVAL || errno == EROFS;
+  close(descriptor);
+  if (!is_written)
+    throw OutputError(file.string() + ": cannot be written in full; check the free space on the disk");
 }
 
 std::string megabytes(std::uintmax_t bytes) { return std::to_string(bytes / (1024 * 1024)) + " MB"; }
@@ -55,6 +68,7 @@ void write_binary(const std::filesystem::path& file, const BinaryFormat& format,
   std::error_code error;
   try {
     write_file(part, whole.bytes());
+    flush_to_disk(part);
   } catch (...) {
     std::filesystem::remove(part, error);
     throw;
@@ -66,25 +80,10 @@ void write_binary(const std::filesystem::path& file, const BinaryFormat& format,
   throw OutputError(file.string() + ": cannot be replaced (" + reason + "); choose another name");
 }
 
-std::string read_binary(const std::filesystem::path& file, const BinaryFormat& format) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) {
-    throw InputError(file.string() + ": no such file; give the path of " + std::string(format.what));
-  }
-  const std::uintmax_t size = std::filesystem::file_size(file, error);
-  if (error) throw InputError(file.string() + ": cannot be read (" + error.message() + ")");
-  if (size > format.max_bytes + kHeader) {
-    throw InputError(file.string() + ": " + megabytes(size) + ", more than " + std::string(format.what) +
-                     " may have (" + megabytes(format.max_bytes) + "); give another file");
-  }
-  std::string bytes(size, '\0');
-  std::ifstream in(file, std::ios::binary);
-  in.read(bytes.data(), static_cast<std::streamsize>(size));
-  if (!in) throw InputError(file.string() + ": cannot be read; check its permissions and the disk");
-  return std::string(check_binary(bytes, format, file.string()));
-}
-
-std::string_view check_binary(std::string_view bytes, const BinaryFormat& format, const std::string& name) {
+namespace {
+// left: bytes behind the header. The checksum that the content must have.
+std::uint32_t check_header(std::string_view bytes, std::size_t left, const BinaryFormat& format,
+                           const std::string& name) {
   if (bytes.empty()) throw InputError(name + ": empty; give the path of " + std::string(format.what));
   if (bytes.substr(0, kMagic) != format.magic.substr(0, std::min(bytes.size(), kMagic))) {
     throw InputError(name + ": not " + std::string(format.what) + " of RO-SLAM; give another file");
@@ -98,9 +97,44 @@ std::string_view check_binary(std::string_view bytes, const BinaryFormat& format
   }
   const auto size = header.get<std::uint64_t>();
   const auto expected = header.get<std::uint32_t>();
-  if (size != header.left()) header.fail("it is not as long as it should be");
-  const std::string_view content = header.get_bytes(header.left());
-  if (crc(content) != expected) header.fail("its checksum does not match");
+  if (size != left) header.fail("it is not as long as it should be");
+  return expected;
+}
+}  // namespace
+
+std::string read_binary(const std::filesystem::path& file, const BinaryFormat& format) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) {
+    throw InputError(file.string() + ": no such file; give the path of " + std::string(format.what));
+  }
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (error) throw InputError(file.string() + ": cannot be read (" + error.message() + ")");
+  if (size > format.max_bytes + kHeader) {
+    throw InputError(file.string() + ": " + megabytes(size) + ", more than " + std::string(format.what) +
+                     " may have (" + megabytes(format.max_bytes) + "); give another file");
+  }
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes;
+  const auto read_up_to = [&](std::size_t end) {
+    const std::size_t begin = bytes.size();
+    bytes.resize(end);
+    in.read(bytes.data() + begin, static_cast<std::streamsize>(end - begin));
+    if (!in) throw InputError(file.string() + ": cannot be read; check its permissions and the disk");
+  };
+  // What is no such file, however large, is told by its first bytes.
+  read_up_to(std::min<std::size_t>(size, kHeader));
+  check_header(bytes, size - bytes.size(), format, file.string());
+  read_up_to(size);
+  check_binary(bytes, format, file.string());
+  bytes.erase(0, kHeader);
+  return bytes;
+}
+
+std::string_view check_binary(std::string_view bytes, const BinaryFormat& format, const std::string& name) {
+  const std::size_t header = std::min(bytes.size(), kHeader);
+  const std::uint32_t expected = check_header(bytes, bytes.size() - header, format, name);
+  const std::string_view content = bytes.substr(header);
+  if (crc(content) != expected) BinaryReader(content, name).fail("its checksum does not match");
   return content;
 }
 

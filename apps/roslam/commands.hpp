@@ -12,6 +12,7 @@ void add_simulate_command(CLI::App& program);
 void add_compose_command(CLI::App& program);
 void add_segment_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
+void add_map_command(CLI::App& program);
 void add_vocabulary_command(CLI::App& program);
 void add_benchmark_command(CLI::App& program, const std::string& version);
 

@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
   roslam::app::add_compose_command(program);
   roslam::app::add_segment_command(program);
   roslam::app::add_evaluate_command(program);
+  roslam::app::add_map_command(program);
   roslam::app::add_vocabulary_command(program);
   roslam::app::add_benchmark_command(program, ROSLAM_VERSION);
   try {

@@ -12,6 +12,7 @@
 #include "apps/roslam/output.hpp"
 #include "apps/roslam/progress.hpp"
 #include "apps/roslam/sources.hpp"
+#include "roslam/atlas/map_file.hpp"
 #include "roslam/error.hpp"
 #include "roslam/pipeline/removal_log.hpp"
 #include "roslam/pipeline/run.hpp"
@@ -31,6 +32,8 @@ struct RunArguments {
   std::string model;       // weights in place of the shipped ones
   std::string vocabulary;  // words in place of the shipped ones
   bool no_loops = false;
+  std::string map;  // to go on from; empty: none
+  bool localise_only = false;
   std::string dynamic;  // empty: as the options say
   bool print_config = false;
   bool video = false;
@@ -87,6 +90,23 @@ std::shared_ptr<const Vocabulary> open_vocabulary(const RunArguments& arguments,
   return nullptr;
 }
 
+void print_map(const Slam& slam) {
+  for (const auto& loop : slam.loops()) {
+    std::printf(
+        "loop: keyframe %u showed the place of keyframe %u again; it moved by %.3f m, %.2f degrees%s\n",
+        loop.keyframe.value, loop.place.value, loop.moved, loop.turned * 180.0 / M_PI,
+        loop.joins ? ", and two parts of the map became one" : "");
+  }
+  for (const auto& [world, frames] : slam.frames_apart()) {
+    std::printf(
+        "note: %zu frames lie in a part of the map that never met the rest; trajectory.txt leaves them "
+        "out\n",
+        frames);
+  }
+  std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
+              slam.map().landmark_count());
+}
+
 void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder& folder) {
   const auto times = slam.times().summary();
   const std::size_t tracked = slam.trajectory().size();
@@ -104,12 +124,7 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
   for (const auto& [fault, count] : slam.labelling_faults()) {
     std::printf("note: %s (%zu times)\n", fault.c_str(), count);
   }
-  for (const auto& loop : slam.loops()) {
-    std::printf("loop: keyframe %u showed the place of keyframe %u again; it moved by %.3f m, %.2f degrees\n",
-                loop.keyframe.value, loop.place.value, loop.moved, loop.turned * 180.0 / M_PI);
-  }
-  std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
-              slam.map().landmark_count());
+  print_map(slam);
   if (const auto found = times.find("tracking"); found != times.end()) {
     std::printf("tracking: median %.1f ms, p95 %.1f ms of processor time a frame\n", found->second.median_ms,
                 found->second.p95_ms);
@@ -117,15 +132,15 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
   std::printf("results: %s\n", folder.path().c_str());
 }
 
-void execute(const RunArguments& arguments, const std::string& version) {
+Options options_of(const RunArguments& arguments) {
   Options options = arguments.config.empty() ? Options{} : read_options(arguments.config);
   if (!arguments.dynamic.empty()) options.removal = *removal_from(arguments.dynamic, options.removal);
   if (arguments.no_loops) options.loop.enabled = false;
-  if (arguments.print_config) {
-    std::cout << options_to_yaml(options);
-    require_written_output();
-    return;
-  }
+  if (arguments.localise_only) options.keyframes.enabled = false;
+  return options;
+}
+
+void check(const RunArguments& arguments, const Options& options) {
   if (arguments.source.name.empty()) throw CLI::RequiredError("SOURCE");
   if (arguments.out.empty()) throw CLI::RequiredError("--out");
   if (!arguments.model.empty() && !options.removal.labels) {
@@ -134,13 +149,27 @@ void execute(const RunArguments& arguments, const std::string& version) {
   if (!arguments.vocabulary.empty() && !options.loop.enabled) {
     throw CLI::ValidationError("--vocabulary", "needs loop.enabled");
   }
+  if (!options.keyframes.enabled && arguments.map.empty()) {
+    throw CLI::ValidationError("--localise-only", "needs --map, a map to find the camera in");
+  }
+}
+
+void execute(const RunArguments& arguments, const std::string& version) {
+  Options options = options_of(arguments);
+  if (arguments.print_config) {
+    std::cout << options_to_yaml(options);
+    require_written_output();
+    return;
+  }
+  check(arguments, options);
   const InterruptWatcher interrupt;
   const auto source = open_source(arguments.source);
   const RunFolder folder(arguments.out);
-  RunDescription description{arguments.source.name, arguments.source.camera, version, {}};
+  RunDescription description{arguments.source.name, arguments.source.camera, version, {}, arguments.map};
   const auto segmenter = open_segmenter(arguments, options, description.segmentation_model);
   Slam slam(source->camera(), options, arguments.real_time ? Mode::kRealTime : Mode::kDeterministic,
             segmenter, open_vocabulary(arguments, options));
+  if (!arguments.map.empty()) slam.continue_from(load_map(arguments.map));
   std::optional<RemovalLog> log;
   RemovalLog::remove_old(folder.path());
   if (options.removal.is_on()) {
@@ -186,7 +215,9 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "  roslam run simulated:street --out street\n"
       "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n"
       "  roslam run my_flight --camera my_camera.yaml --real-time --out live\n"
-      "RUN then holds trajectory.txt and keyframes.txt (TUM format), map.ply, trajectory.png and run.json.\n"
+      "  roslam run another_flight --map live/map.roslam --out further\n"
+      "RUN then holds trajectory.txt and keyframes.txt (TUM format), map.ply, map.roslam, trajectory.png and "
+      "run.json.\n"
       "Ctrl-C ends the run early and writes what was computed so far (exit code 0, \"interrupted\" in "
       "run.json).");
   add_source_options(*command, arguments->source);
@@ -215,6 +246,10 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command->add_option("--vocabulary", arguments->vocabulary,
                       "Words that places are recognised by, in place of those that come with the program");
   command->add_flag("--no-loops", arguments->no_loops, "Close no loops; the path is then as odometry has it");
+  command->add_option("--map", arguments->map,
+                      "Go on from the map of an earlier flight with this camera (map.roslam of its folder)");
+  command->add_flag("--localise-only", arguments->localise_only,
+                    "Find the camera in --map and leave the map as it is");
   add_flight_options(*command, arguments->source);
   command->add_flag("--print-config", arguments->print_config, "Print the effective options and stop");
   command->add_flag("--video", arguments->video,

@@ -28,6 +28,14 @@ class SE3 {
   SE3(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation)
       : SE3(Eigen::Quaterniond(rotation), translation) {}
 
+  /// A motion from parts that came from one, bit by bit: the quaternion must be of unit length already.
+  static SE3 from_parts(const Eigen::Quaterniond& unit, const Eigen::Vector3d& translation) {
+    SE3 result;
+    result.rotation_ = unit;
+    result.translation_ = translation;
+    return result;
+  }
+
   /// Tangent (translation part first, then rotation vector) to motion, and back.
   static SE3 exp(const Vector6d& tangent);
   Vector6d log() const;

@@ -16,8 +16,8 @@ struct EssentialGraph {
   PoseGraph graph;
   std::vector<KeyframeId> keyframes;  ///< of each node
 
-  /// The first keyframe is fixed. min_shared: landmarks that make a pair. closing: a loop that is not in the
-  /// map yet.
+  /// The first keyframe of each world is fixed. min_shared: landmarks that make a pair. closing: a loop that
+  /// is not in the map yet.
   static EssentialGraph of(const Map& map, int min_shared, const std::optional<LoopClosure>& closing = {});
 
   /// What has to happen to the map for its keyframes to lie as in the graph; before: the graph as it was

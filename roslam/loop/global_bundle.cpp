@@ -16,9 +16,10 @@ GlobalBundle GlobalBundle::of(const Map& map, std::mutex& map_mutex, const Measu
   {
     const std::scoped_lock lock(map_mutex);
     pose_of.resize(map.keyframe_slots());
+    const std::set<KeyframeId> origins = map.origins();
     for (const KeyframeId id : map.keyframe_ids()) {
       pose_of[id.index()] = result.keyframes.size();
-      result.problem.poses.push_back({map.find(id)->T_camera_world, result.keyframes.empty()});
+      result.problem.poses.push_back({map.find(id)->T_camera_world, origins.count(id) > 0});
       result.keyframes.push_back(id);
     }
     candidates = map.landmark_ids();

@@ -16,8 +16,8 @@ struct GlobalBundle {
   std::vector<KeyframeId> keyframes;  ///< of each pose
   std::vector<LandmarkId> landmarks;  ///< of each point
 
-  /// The first keyframe is fixed. Takes the mutex for a few milliseconds at a time, so that the tracker never
-  /// has to wait for the whole.
+  /// The first keyframe of each world is fixed. Takes the mutex for a few milliseconds at a time, so that the
+  /// tracker never has to wait for the whole.
   static GlobalBundle of(const Map& map, std::mutex& map_mutex, const MeasurementNoise& noise);
 
   /// What has to happen to the map for it to be as in the problem; before: the problem as it was taken.

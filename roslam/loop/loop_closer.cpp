@@ -35,9 +35,9 @@ void LoopCloser::process(KeyframeId keyframe, const std::function<bool()>& shoul
   times_.recognise = watch.seconds();
   if (!loop) return;
   watch = {};
-  const bool is_straight = straighten(*loop, should_stop);
+  const bool is_closed = join_worlds(*loop) || straighten(*loop, should_stop);
   times_.correct = watch.seconds();
-  if (!is_straight) return;
+  if (!is_closed) return;
   watch = {};
   fuse(*loop);
   times_.fuse = watch.seconds();
@@ -56,19 +56,44 @@ std::optional<Loop> LoopCloser::recognise(KeyframeId keyframe) {
   }
   BagOfWords bag = places_.describe(*view);
   const std::scoped_lock lock(map_mutex_);
-  forget_removed();
+  // So that the index grows with the map, not with time.
+  places_.retain([this](KeyframeId id) { return map_.find(id) != nullptr; });
   places_.add(keyframe, std::move(bag));
-  indexed_.push_back(keyframe);
   return detector_.detect(map_, places_, keyframe);
 }
 
-// So that the index grows with the map, not with time. Called with the mutex held.
-void LoopCloser::forget_removed() {
-  std::erase_if(indexed_, [&](KeyframeId id) {
-    if (map_.find(id) != nullptr) return false;
-    places_.remove(id);
-    return true;
-  });
+// False if keyframe and place are of one world.
+bool LoopCloser::join_worlds(const Loop& loop) {
+  const std::scoped_lock lock(map_mutex_);
+  const Keyframe* keyframe = map_.find(loop.keyframe);
+  const Keyframe* place = map_.find(loop.match.place);
+  if (keyframe == nullptr || place == nullptr || keyframe->world == place->world) return false;
+  const SE3 T_camera_old = keyframe->T_camera_world;
+  const SE3 T_to_from = loop.match.T_camera_world * place->T_camera_world.inverse();
+  // From the keyframe's world to that of the place.
+  const SE3 T_place_keyframe = loop.match.T_camera_world.inverse() * T_camera_old;
+  const bool is_newer = keyframe->world > place->world;
+  const WorldId moving = is_newer ? keyframe->world : place->world;
+  const WorldId resting = is_newer ? place->world : keyframe->world;
+  MapCorrection correction;
+  for (const KeyframeId id : map_.keyframe_ids()) {
+    if (map_.find(id)->world != moving) continue;
+    correction.T_old_new[id] = is_newer ? T_place_keyframe.inverse() : T_place_keyframe;
+  }
+  correction.apply_to(map_);
+  map_.join_worlds(moving, resting);
+  map_.add_loop(loop.match.place, loop.keyframe, T_to_from);
+  detector_.reset();
+  note(loop, T_camera_old, true);
+  return true;
+}
+
+// Called with the mutex held. T_camera_old: of the keyframe before.
+void LoopCloser::note(const Loop& loop, const SE3& T_camera_old, bool joins) {
+  const SE3 T_camera_new = map_.find(loop.keyframe)->T_camera_world;
+  const Eigen::Vector3d moved = T_camera_old.inverse().translation() - T_camera_new.inverse().translation();
+  const double turned = (T_camera_old * T_camera_new.inverse()).angle();
+  closed_.push_back({loop.keyframe, loop.match.place, moved.norm(), turned, loop.match.inliers, joins});
 }
 
 bool LoopCloser::straighten(const Loop& loop, const std::function<bool()>& should_stop) {
@@ -93,14 +118,10 @@ bool LoopCloser::straighten(const Loop& loop, const std::function<bool()>& shoul
   const MapCorrection correction = essential.correction(before);
   const std::scoped_lock lock(map_mutex_);
   if (map_.find(closing.from) == nullptr || map_.find(closing.to) == nullptr) return false;
-  const SE3 moved = correction.T_old_new.at(closing.to);
   const SE3 T_camera_old = map_.find(closing.to)->T_camera_world;
   correction.apply_to(map_);
   map_.add_loop(closing.from, closing.to, closing.T_to_from);
-  const SE3 T_camera_new = map_.find(closing.to)->T_camera_world;
-  closed_.push_back({loop.keyframe, loop.match.place,
-                     (T_camera_old.inverse().translation() - T_camera_new.inverse().translation()).norm(),
-                     moved.angle(), loop.match.inliers});
+  note(loop, T_camera_old, false);
   return true;
 }
 

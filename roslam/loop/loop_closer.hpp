@@ -34,10 +34,12 @@ struct ClosedLoop {
   double moved = 0.0;   ///< metres by which the newer keyframe was corrected
   double turned = 0.0;  ///< radians
   int matches = 0;      ///< landmarks it was recognised by
+  bool joins = false;   ///< two worlds became one by it
 };
 
 /// Finds loops keyframe by keyframe and takes the drift out of the map: pose graph, fusion of what is there
-/// twice, global bundle adjustment (Mur-Artal and Tardos, T-RO 2017, section III).
+/// twice, global bundle adjustment (Mur-Artal and Tardos, T-RO 2017, section III). Where the place is of
+/// another world, the newer of the two moves to where it belongs and they become one.
 class LoopCloser {
  public:
   struct Settings {
@@ -57,6 +59,9 @@ class LoopCloser {
   /// the parts that touch the map. should_stop ends global bundle adjustment early.
   void process(KeyframeId keyframe, const std::function<bool()>& should_stop = {});
 
+  /// Global bundle adjustment, as after a loop. Takes the mutex for the parts that touch the map.
+  void adjust_all(const std::function<bool()>& should_stop = {});
+
   const std::vector<ClosedLoop>& closed() const { return closed_; }
   std::size_t refused() const { return refused_; }  ///< loops that would have bent the map too much
 
@@ -71,10 +76,10 @@ class LoopCloser {
 
  private:
   std::optional<Loop> recognise(KeyframeId keyframe);
-  void forget_removed();
   bool straighten(const Loop& loop, const std::function<bool()>& should_stop);
+  bool join_worlds(const Loop& loop);
+  void note(const Loop& loop, const SE3& T_camera_old, bool joins);
   void fuse(const Loop& loop);
-  void adjust_all(const std::function<bool()>& should_stop);
 
   Camera camera_;
   Map& map_;
@@ -82,7 +87,6 @@ class LoopCloser {
   std::mutex& map_mutex_;
   Settings settings_;
   LoopDetector detector_;
-  std::vector<KeyframeId> indexed_;  // keyframes in the index
   std::vector<ClosedLoop> closed_;
   std::size_t refused_ = 0;
   Times times_;

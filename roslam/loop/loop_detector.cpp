@@ -106,6 +106,8 @@ std::set<KeyframeId> LoopDetector::surroundings(const Map& map, KeyframeId keyfr
 bool LoopDetector::is_plausible(const Map& map, KeyframeId keyframe, const PlaceMatch& match) const {
   constexpr double kAlways = 0.2;           // metres
   constexpr double kRadiansPerMetre = 0.5;  // of drift in position, about 30 degrees
+  // Worlds lie to each other in any way.
+  if (map.find(keyframe)->world != map.find(match.place)->world) return true;
   const double path = path_between(map, std::min(match.place, keyframe), std::max(match.place, keyframe));
   const double allowed = kAlways + options_.max_drift * path;
   return are_near(map.find(keyframe)->T_camera_world, match.T_camera_world, allowed,

@@ -33,9 +33,13 @@ SE3 MapCorrection::motion_for(const Map& map, const Keyframe& keyframe) const {
     const auto theirs = T_old_new.find(neighbour);
     if (theirs != T_old_new.end()) return theirs->second;
   }
-  // Sees nothing that older keyframes see: the one before it in time.
-  const auto after = T_old_new.upper_bound(keyframe.id);
-  return after == T_old_new.begin() ? after->second : std::prev(after)->second;
+  // Sees nothing that older keyframes see: the one before it in time, if there is one in its world.
+  for (auto before = T_old_new.upper_bound(keyframe.id); before != T_old_new.begin();) {
+    --before;
+    const Keyframe* earlier = map.find(before->first);
+    if (earlier != nullptr && earlier->world == keyframe.world) return before->second;
+  }
+  return {};
 }
 
 }  // namespace roslam

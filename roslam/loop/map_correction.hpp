@@ -18,8 +18,8 @@ struct MapCorrection {
   /// sees them.
   std::map<LandmarkId, Eigen::Vector3d> positions;
 
-  /// Corrects a map of which the snapshot was taken: keyframes that came since move along with the one that
-  /// shares most with them, keyframes that moved since keep that motion.
+  /// Corrects a map of which the snapshot was taken: keyframes that came since move along with the one of
+  /// their world that shares most with them, keyframes that moved since keep that motion.
   void apply_to(Map& map) const;
 
  private:

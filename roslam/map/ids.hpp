@@ -21,4 +21,7 @@ struct Id {
 using KeyframeId = Id<struct KeyframeTag>;
 using LandmarkId = Id<struct LandmarkTag>;
 
+/// A part of a map that is tied to no other: where the parts lie to each other is not known (yet).
+using WorldId = Id<struct WorldTag>;
+
 }  // namespace roslam

@@ -13,14 +13,72 @@ constexpr float kFarTolerance = 1.2F;
 }  // namespace
 
 KeyframeId Map::add_keyframe(std::size_t frame_index, double timestamp, const SE3& T_camera_world,
-                             std::shared_ptr<const ObservedFrame> view) {
-  const KeyframeId id{static_cast<std::uint32_t>(keyframes_.size())};
-  const std::size_t points = view->size();
-  keyframes_.push_back(std::make_unique<Keyframe>(Keyframe{
-      id, frame_index, timestamp, T_camera_world, std::move(view), std::vector<LandmarkId>(points)}));
+                             std::shared_ptr<const ObservedFrame> view, WorldId world) {
+  return insert(Keyframe{{}, frame_index, timestamp, T_camera_world, std::move(view), {}, world, flight_});
+}
+
+KeyframeId Map::insert(Keyframe keyframe) {
+  keyframe.id = KeyframeId{static_cast<std::uint32_t>(keyframes_.size())};
+  keyframe.landmarks.assign(keyframe.view->size(), {});
+  newest_world_ = std::max(newest_world_, keyframe.world.value);
+  flight_ = std::max(flight_, keyframe.flight);
+  keyframes_.push_back(std::make_unique<Keyframe>(std::move(keyframe)));
   anchors_.emplace_back();
   ++keyframe_count_;
-  return id;
+  return keyframes_.back()->id;
+}
+
+LandmarkId Map::insert(Landmark landmark) {
+  landmark.id = LandmarkId{static_cast<std::uint32_t>(landmarks_.size())};
+  for (const auto& [keyframe, point] : landmark.observations) find(keyframe)->landmarks[point] = landmark.id;
+  landmarks_.push_back(std::make_unique<Landmark>(std::move(landmark)));
+  merged_into_.emplace_back();
+  ++landmark_count_;
+  return landmarks_.back()->id;
+}
+
+void Map::append(const Map& other) {
+  const std::uint32_t worlds = keyframe_count_ > 0 ? newest_world_ + 1 : 0;
+  const std::uint32_t flights = keyframe_count_ > 0 ? flight_ + 1 : 0;
+  std::vector<KeyframeId> id_of(other.keyframe_slots());
+  for (const KeyframeId id : other.keyframe_ids()) {
+    Keyframe keyframe = *other.find(id);
+    keyframe.world.value += worlds;
+    keyframe.flight += flights;
+    id_of[id.index()] = insert(std::move(keyframe));
+  }
+  for (const LandmarkId id : other.landmark_ids()) {
+    Landmark landmark = *other.find(id);
+    for (auto& observation : landmark.observations)
+      observation.keyframe = id_of[observation.keyframe.index()];
+    landmark.created_by = id_of[other.T_camera_anchor(landmark.created_by).first.index()];
+    insert(std::move(landmark));
+  }
+  for (const auto& loop : other.loops())
+    add_loop(id_of[loop.from.index()], id_of[loop.to.index()], loop.T_to_from);
+}
+
+std::vector<WorldId> Map::worlds() const {
+  std::set<WorldId> result;
+  for (const auto& keyframe : keyframes_) {
+    if (keyframe) result.insert(keyframe->world);
+  }
+  return {result.begin(), result.end()};
+}
+
+void Map::join_worlds(WorldId from, WorldId into) {
+  for (const auto& keyframe : keyframes_) {
+    if (keyframe && keyframe->world == from) keyframe->world = into;
+  }
+}
+
+std::set<KeyframeId> Map::origins() const {
+  std::set<KeyframeId> result;
+  std::set<WorldId> held;
+  for (const auto& keyframe : keyframes_) {
+    if (keyframe && held.insert(keyframe->world).second) result.insert(keyframe->id);
+  }
+  return result;
 }
 
 LandmarkId Map::add_landmark(const Eigen::Vector3d& position, KeyframeId keyframe, std::uint32_t point) {

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <set>
 #include <span>
 #include <utility>
 #include <vector>
@@ -18,11 +19,13 @@ namespace roslam {
 /// A frame kept in the map.
 struct Keyframe {
   KeyframeId id;
-  std::size_t frame_index = 0;  ///< index of the frame in its source
-  double timestamp = 0.0;       ///< seconds
-  SE3 T_camera_world;
+  std::size_t frame_index = 0;                ///< index of the frame in its source
+  double timestamp = 0.0;                     ///< seconds
+  SE3 T_camera_world;                         ///< in its world; poses in different worlds cannot be compared
   std::shared_ptr<const ObservedFrame> view;  ///< its points
   std::vector<LandmarkId> landmarks;          ///< landmark each point of the view shows, or none
+  WorldId world{0};
+  std::uint32_t flight = 0;  ///< which of the flights that made the map it is of; timestamps are the flight's
 };
 
 /// Which point of which keyframe shows a landmark.
@@ -63,11 +66,22 @@ class Map {
   /// recognised at follow.
   explicit Map(std::vector<float> scales) : scales_(std::move(scales)) {}
 
+  /// A new keyframe of the flight at hand, that sees no landmark yet.
   KeyframeId add_keyframe(std::size_t frame_index, double timestamp, const SE3& T_camera_world,
-                          std::shared_ptr<const ObservedFrame> view);
+                          std::shared_ptr<const ObservedFrame> view, WorldId world = WorldId{0});
 
   /// A new landmark first seen by that point of that keyframe.
   LandmarkId add_landmark(const Eigen::Vector3d& position, KeyframeId keyframe, std::uint32_t point);
+
+  /// Takes a keyframe as it is but for its id, which is new, and the landmarks it sees, which insert brings.
+  KeyframeId insert(Keyframe keyframe);
+
+  /// Takes a landmark as it is but for its id, which is new. Its observations must be of keyframes that live,
+  /// in their order, of points that see no other landmark.
+  LandmarkId insert(Landmark landmark);
+
+  /// Takes over all that lives in another map, with new ids without gaps, as worlds and flights of its own.
+  void append(const Map& other);
 
   /// Notes that a point of a keyframe shows a landmark. Does nothing and returns false if the point is taken,
   /// or if the keyframe sees the landmark already.
@@ -95,6 +109,25 @@ class Map {
   /// older state of the map does not fit it any more.
   void note_correction() { ++corrections_; }
   std::size_t corrections() const { return corrections_; }
+
+  /// A world that no keyframe is in yet. The first, 0, is always there.
+  WorldId new_world() { return WorldId{++newest_world_}; }
+
+  /// The worlds that have keyframes, oldest first.
+  std::vector<WorldId> worlds() const;
+
+  /// The world of a keyframe, also of one that was removed.
+  WorldId world_of(KeyframeId id) const { return find(T_camera_anchor(id).first)->world; }
+
+  /// Makes two worlds one that lie to each other by now as they should.
+  void join_worlds(WorldId from, WorldId into);
+
+  /// The oldest keyframe of each world, which holds it in place.
+  std::set<KeyframeId> origins() const;
+
+  /// Keyframes that follow are of a new flight.
+  void begin_flight() { ++flight_; }
+  std::uint32_t flight() const { return flight_; }
 
   /// Nullptr if there is none, or no longer.
   Keyframe* find(KeyframeId id);
@@ -152,6 +185,8 @@ class Map {
   std::vector<LandmarkId> merged_into_;               // by landmark id
   std::vector<LoopClosure> loops_;
   std::size_t corrections_ = 0;
+  std::uint32_t newest_world_ = 0;
+  std::uint32_t flight_ = 0;
   std::size_t keyframe_count_ = 0;
   std::size_t landmark_count_ = 0;
 };

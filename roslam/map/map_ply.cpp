@@ -9,10 +9,12 @@
 
 namespace roslam {
 
-void write_map_ply(const std::filesystem::path& file, const Map& map) {
+void write_map_ply(const std::filesystem::path& file, const Map& map, WorldId world) {
   static_assert(std::endian::native == std::endian::little, "the PLY header promises little-endian values");
   std::ostringstream out;
-  const auto ids = map.landmark_ids();
+  auto ids = map.landmark_ids();
+  std::erase_if(
+      ids, [&](LandmarkId id) { return map.world_of(map.find(id)->observations.front().keyframe) != world; });
   out << "ply\nformat binary_little_endian 1.0\ncomment RO-SLAM sparse map, world frame, metres\n"
       << "element vertex " << ids.size() << "\n"
       << "property float x\nproperty float y\nproperty float z\n"

@@ -7,8 +7,8 @@
 
 namespace roslam {
 
-/// Writes the landmarks as a coloured point cloud (binary little-endian PLY: float x y z in metres in the
-/// world frame, uchar red green blue). Throws OutputError if the file cannot be written in full.
-void write_map_ply(const std::filesystem::path& file, const Map& map);
+/// Writes the landmarks of a world as a coloured point cloud (binary little-endian PLY: float x y z in metres
+/// in the world frame, uchar red green blue). Throws OutputError if the file cannot be written in full.
+void write_map_ply(const std::filesystem::path& file, const Map& map, WorldId world = WorldId{0});
 
 }  // namespace roslam

@@ -117,9 +117,10 @@ int cull_contradicted(Map& map, const std::vector<LandmarkId>& landmarks, const 
 
 int cull_keyframes(Map& map, KeyframeId newest, const CullingOptions& options) {
   int removed = 0;
+  const std::set<KeyframeId> origins = map.origins();
   for (const auto& [id, shared] : map.covisible(newest)) {
     const bool is_protected =
-        id.value == 0 || id.value + static_cast<std::uint32_t>(options.keep_newest) > newest.value;
+        origins.count(id) > 0 || id.value + static_cast<std::uint32_t>(options.keep_newest) > newest.value;
     const Keyframe* keyframe = map.find(id);
     if (is_protected || keyframe == nullptr || !is_redundant(map, *keyframe, options)) continue;
     const auto neighbours = map.covisible(id);

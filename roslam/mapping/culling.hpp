@@ -50,7 +50,7 @@ int cull_contradicted(Map& map, const std::vector<LandmarkId>& landmarks, const 
                       const SE3& T_camera_world, const Contradiction& frame, const MeasurementNoise& noise);
 
 /// Removes the keyframes around one that add nothing: nearly all their landmarks are seen by enough others at
-/// the same or a finer level. The first keyframe stays. Returns how many were removed.
+/// the same or a finer level. The first keyframe of a world stays. Returns how many were removed.
 int cull_keyframes(Map& map, KeyframeId newest, const CullingOptions& options);
 
 }  // namespace roslam

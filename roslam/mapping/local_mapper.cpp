@@ -18,13 +18,21 @@ LocalMapper::LocalMapper(const Camera& camera, Map& map, std::mutex& map_mutex, 
 }
 
 KeyframeId LocalMapper::insert(const TrackedFrame& frame, std::size_t frame_index) {
-  const KeyframeId id = map_.add_keyframe(frame_index, frame.timestamp, *frame.T_camera_world, frame.view);
+  const KeyframeId id =
+      map_.add_keyframe(frame_index, frame.timestamp, *frame.T_camera_world, frame.view, world_of(frame));
   for (std::uint32_t i = 0; i < frame.landmarks.size(); ++i) {
     if (!frame.landmarks[i].is_valid() || frame.view->may_move(i)) continue;
     if (map_.add_observation(frame.landmarks[i], id, i)) map_.refresh(frame.landmarks[i]);
   }
   landmark_culler_.watch(landmarks_from_depth(map_, id, camera_, settings_.noise, settings_.landmarks));
   return id;
+}
+
+// A frame that refers to no keyframe is the first of its world.
+WorldId LocalMapper::world_of(const TrackedFrame& frame) {
+  if (map_.keyframe_count() == 0) return WorldId{0};
+  if (!frame.reference.is_valid()) return map_.new_world();
+  return map_.world_of(frame.reference);
 }
 
 void LocalMapper::process(KeyframeId keyframe, const std::function<bool()>& should_stop) {
@@ -77,15 +85,16 @@ LocalBundle LocalBundle::around(const Map& map, KeyframeId keyframe, const Measu
                                 const BundleAdjustmentOptions& options) {
   LocalBundle local;
   std::vector<int> pose_of(map.keyframe_slots(), -1);
+  const std::set<KeyframeId> origins = map.origins();
   const auto add_pose = [&](KeyframeId id, bool is_fixed) {
     pose_of[id.index()] = static_cast<int>(local.keyframes.size());
     local.keyframes.push_back(id);
     local.problem.poses.push_back({map.find(id)->T_camera_world, is_fixed});
   };
-  add_pose(keyframe, keyframe.value == 0);
+  add_pose(keyframe, origins.count(keyframe) > 0);
   for (const auto& [id, shared] : map.covisible(keyframe, options.min_shared)) {
     if (static_cast<int>(local.keyframes.size()) >= options.window) break;
-    add_pose(id, id.value == 0);
+    add_pose(id, origins.count(id) > 0);
   }
   std::vector<bool> is_in(map.landmark_slots(), false);
   const std::vector<KeyframeId> moving = local.keyframes;

@@ -30,8 +30,8 @@ class LocalMapper {
   /// map_mutex guards the map against the tracker while process() runs on another thread.
   LocalMapper(const Camera& camera, Map& map, std::mutex& map_mutex, const Settings& settings);
 
-  /// Makes a keyframe of a tracked frame, with landmarks for all points of known depth. Quick; the caller
-  /// holds the mutex.
+  /// Makes a keyframe of a tracked frame, with landmarks for all points of known depth; of a new world if
+  /// the frame has no reference. Quick; the caller holds the mutex.
   KeyframeId insert(const TrackedFrame& frame, std::size_t frame_index);
 
   /// Culls, triangulates, fuses and adjusts around a keyframe. Slow; takes the mutex for the parts that touch
@@ -48,6 +48,7 @@ class LocalMapper {
   const Times& times() const { return times_; }
 
  private:
+  WorldId world_of(const TrackedFrame& frame);
   void adjust_around(KeyframeId keyframe, const std::function<bool()>& should_stop);
 
   Camera camera_;
@@ -65,7 +66,7 @@ struct LocalBundle {
   std::vector<LandmarkId> landmarks;  ///< of each point
 
   /// The keyframe, the keyframes that share enough landmarks with it, all their landmarks, and as fixed poses
-  /// the other keyframes that see those. The first keyframe is always fixed.
+  /// the other keyframes that see those. The first keyframe of a world is always fixed.
   static LocalBundle around(const Map& map, KeyframeId keyframe, const MeasurementNoise& noise,
                             const BundleAdjustmentOptions& options);
 

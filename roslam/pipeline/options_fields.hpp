@@ -69,6 +69,8 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("tracker", "hidden_share", o.tracker.hidden_share);
   visit("tracker", "max_predicted", o.tracker.max_predicted);
   visit("tracker", "recently_lost_frames", o.tracker.recently_lost_frames);
+  visit("tracker", "new_world_frames", o.tracker.new_world_frames);
+  visit("keyframes", "enabled", o.keyframes.enabled);
   visit("keyframes", "max_interval", o.keyframes.max_interval);
   visit("keyframes", "min_interval", o.keyframes.min_interval);
   visit("keyframes", "min_overlap", o.keyframes.min_overlap);

@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "roslam/atlas/map_file.hpp"
 #include "roslam/error.hpp"
 #include "roslam/evaluation/trajectory_plot.hpp"
 #include "roslam/map/map_ply.hpp"
@@ -13,10 +14,13 @@
 namespace roslam {
 
 namespace {
-struct Result {
+enum class Result { kWritten, kRemoved, kKept };
+
+// What becomes of a file of the run folder.
+struct Output {
   const char* file;
   std::function<void(const std::filesystem::path&)> write;
-  bool is_there = true;  // false: this run has no such result
+  Result result = Result::kWritten;
 };
 
 // The result of an earlier run must not pass for one of this run.
@@ -27,9 +31,10 @@ void remove_old(const std::filesystem::path& file) {
     throw OutputError(file.string() + ": left by an earlier run and cannot be removed; choose another --out");
 }
 
-void write_one(const Result& result, const std::filesystem::path& file) {
+void write_one(const Output& output, const std::filesystem::path& file) {
   try {
-    result.is_there ? result.write(file) : remove_old(file);
+    if (output.result == Result::kWritten) output.write(file);
+    if (output.result == Result::kRemoved) remove_old(file);
   } catch (const OutputError&) {
     throw;
   } catch (const std::exception& error) {
@@ -53,22 +58,27 @@ void RunFolder::write(const Slam& slam, const RunSummary& summary, const FrameSo
                       const RunDescription& description) const {
   using Path = std::filesystem::path;
   const Trajectory trajectory = slam.trajectory();
-  const std::vector<Result> results{
+  const auto if_any = [](bool is_any, Result otherwise) { return is_any ? Result::kWritten : otherwise; };
+  const bool has_new_map = slam.options().keyframes.enabled && slam.map().keyframe_count() > 0;
+  const std::vector<Output> outputs{
       {"trajectory.txt", [&](const Path& file) { write_trajectory(file, trajectory); }},
       {"keyframes.txt", [&](const Path& file) { write_trajectory(file, slam.keyframes()); }},
       {"run.json",
        [&](const Path& file) { write_file(file, run_report(slam, summary, source, description)); }},
       {"groundtruth.txt", [&](const Path& file) { write_trajectory(file, summary.truth); },
-       !summary.truth.empty()},
+       if_any(!summary.truth.empty(), Result::kRemoved)},
       {"trajectory.png",
        [&](const Path& file) { write_png(file, plot_trajectory(trajectory, "RO-SLAM", WorldUp::kZ)); },
-       !trajectory.empty()},
-      {"map.ply", [&](const Path& file) { write_map_ply(file, slam.map()); }},
+       if_any(!trajectory.empty(), Result::kRemoved)},
+      {"map.ply", [&](const Path& file) { write_map_ply(file, slam.map(), slam.main_world()); }},
+      // Perhaps the one that this flight was made in: a map is never lost for want of another.
+      {"map.roslam", [&](const Path& file) { save_map(file, slam.snapshot()); },
+       if_any(has_new_map, Result::kKept)},
   };
   std::exception_ptr first_failure;
-  for (const auto& result : results) {
+  for (const auto& output : outputs) {
     try {
-      write_one(result, path_ / result.file);
+      write_one(output, path_ / output.file);
     } catch (const OutputError&) {
       if (!first_failure) first_failure = std::current_exception();
     }

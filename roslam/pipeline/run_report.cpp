@@ -117,9 +117,19 @@ Json loops_json(const Slam& slam) {
                               {"place", loop.place.value},
                               {"moved_metres", rounded(loop.moved, 4)},
                               {"turned_degrees", rounded(loop.turned * 180.0 / M_PI, 3)},
-                              {"matches", loop.matches}});
+                              {"matches", loop.matches},
+                              {"joins", loop.joins}});
   }
   return json;
+}
+
+Json map_json(const Slam& slam, const RunDescription& description) {
+  std::size_t apart = 0;
+  for (const auto& [world, frames] : slam.frames_apart()) apart += frames;
+  return {{"from", description.map.empty() ? Json(nullptr) : Json(description.map)},
+          {"localise_only", !slam.options().keyframes.enabled},
+          {"worlds", slam.map().worlds().size()},
+          {"frames_apart", apart}};
 }
 
 double path_length(const Trajectory& trajectory) {
@@ -145,6 +155,7 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   json["frames"] = frames_json(slam, summary, source);
   json["dynamic"] = dynamic_json(slam, summary, description);
   json["loops"] = loops_json(slam);
+  json["map"] = map_json(slam, description);
   json["keyframes"] = slam.map().keyframe_count();
   json["landmarks"] = slam.map().landmark_count();
   json["path_length_metres"] = rounded(path_length(slam.trajectory()), 3);

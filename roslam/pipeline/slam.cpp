@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "roslam/error.hpp"
 #include "roslam/geometry/stopwatch.hpp"
 
 namespace roslam {
@@ -48,6 +49,13 @@ Slam::Slam(const Camera& camera, const Options& options, Mode mode, std::shared_
   loop_closer_.emplace(camera_, map_, *places_, map_mutex_, options_.loop_settings());
 }
 
+void Slam::continue_from(SavedMap saved) {
+  saved.require_fits(camera_, map_.scales());
+  map_ = std::move(saved.map);
+  map_.begin_flight();
+  if (places_) saved.index(*places_);
+}
+
 void Slam::map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,
                         StageTimes& times) {
   // The next keyframe matters more than the last step of refining this one.
@@ -73,12 +81,6 @@ void Slam::close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& sh
   times.add("loop.bundle_adjustment", t.bundle);
 }
 
-std::vector<ClosedLoop> Slam::loops() const {
-  return loop_closer_ ? loop_closer_->closed() : std::vector<ClosedLoop>{};
-}
-
-std::size_t Slam::refused_loops() const { return loop_closer_ ? loop_closer_->refused() : 0; }
-
 // Called with the map's mutex held.
 std::vector<KeyframeId> Slam::similar_keyframes(const ObservedFrame& view) const {
   std::vector<KeyframeId> result;
@@ -99,7 +101,19 @@ void Slam::follow_correction() {
   }
 }
 
+// What removal remembers is of the world the camera was in. Called with the map's mutex held.
+void Slam::follow_world(const TrackedFrame& frame) {
+  if (!frame.T_camera_world) return;
+  const bool is_other =
+      last_reference_.is_valid() &&
+      (!frame.reference.is_valid() || map_.world_of(frame.reference) != map_.world_of(last_reference_));
+  if (is_other) removal_.leave_world();
+  last_reference_ = frame.reference;
+}
+
 std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask) {
+  if (records_.empty() && map_.keyframe_count() == 0 && !options_.keyframes.enabled)
+    throw OptionsError("keyframes.enabled is false and there is no map to find the camera in; give one");
   if (!is_usable(frame)) return std::nullopt;
   const Stopwatch watch;
   FrameResult result;
@@ -121,14 +135,17 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
   TrackedFrame tracked = tracker_.track(view, frame.timestamp, hint);
   tracked.hidden = count_hidden(tracked, removed);
   KeyframeId keyframe;
+  const bool begins_world = tracked.T_camera_world && !tracked.reference.is_valid();
   const bool has_room = mapping_.waiting() < static_cast<std::size_t>(options_.threads.keyframe_queue);
-  if (has_room && keyframe_policy_.promotes(tracked, map_, mapping_.is_idle())) {
+  if ((has_room || begins_world) && keyframe_policy_.promotes(tracked, map_, mapping_.is_idle())) {
     keyframe = mapper_.insert(tracked, frame.index);
     keyframe_policy_.promoted(tracked);
     tracker_.promoted(keyframe);
     tracked.reference = keyframe;
   }
   record(tracked);
+  follow_world(tracked);
+  if (tracked.reference.is_valid()) result.world = map_.world_of(tracked.reference);
   last_T_camera_world_ = tracked.T_camera_world ? tracked.T_camera_world : last_T_camera_world_;
   cull_contradicted(tracked, frame, result.removal);
   map_lock.unlock();
@@ -212,16 +229,9 @@ std::shared_ptr<const ObservedFrame> Slam::extract(const Frame& frame, const cv:
   return view;
 }
 
-std::map<std::string, std::size_t> Slam::labelling_faults() const {
-  auto faults = segmentation_.faults();
-  for (const auto& [reason, count] : removal_.faults()) faults[reason] += count;
-  if (removal_.flickers() > 0) faults["labels come and go"] += removal_.flickers();
-  return faults;
-}
-
 // What came into the map before it was known to move goes.
 void Slam::cull_contradicted(const TrackedFrame& frame, const Frame& images, const Removal& removal) {
-  if (!removes() || frame.state != TrackingState::kTracking) return;
+  if (!removes() || !options_.keyframes.enabled || frame.state != TrackingState::kTracking) return;
   cv::Mat moving;
   for (const auto& object : removal.objects) {
     if (moving.empty()) moving = cv::Mat::zeros(images.colour.size(), CV_8UC1);
@@ -273,33 +283,6 @@ void Slam::note_times(double removal, double extract, double total) {
 void Slam::finish() {
   mapping_.drain();
   closing_.drain();
-}
-
-Trajectory Slam::trajectory() const {
-  Trajectory result;
-  for (const auto& record : records_) {
-    if (!record.reference.is_valid()) continue;
-    const SE3 T_camera_world = record.T_camera_reference * map_.T_camera_world(record.reference);
-    result.push_back({record.timestamp, T_camera_world.inverse()});
-  }
-  return result;
-}
-
-Trajectory Slam::keyframes() const {
-  Trajectory result;
-  for (const KeyframeId id : map_.keyframe_ids()) {
-    const Keyframe& keyframe = *map_.find(id);
-    result.push_back({keyframe.timestamp, keyframe.T_camera_world.inverse()});
-  }
-  return result;
-}
-
-StageTimes Slam::times() const {
-  StageTimes all = times_;
-  all.add_all(mapping_.times());
-  all.add_all(closing_.times());
-  all.add_all(segmentation_.times());
-  return all;
 }
 
 }  // namespace roslam

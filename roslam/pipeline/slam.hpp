@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "roslam/atlas/saved_map.hpp"
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/trajectory.hpp"
@@ -31,6 +32,7 @@ struct FrameResult {
   double timestamp = 0.0;  ///< seconds
   TrackingState state = TrackingState::kInitialising;
   std::optional<SE3> T_world_camera;  ///< as known now; later corrections show in Slam::trajectory()
+  WorldId world;                      ///< that the pose is in; a world that is met again becomes one with it
   int inliers = 0;                    ///< landmarks the pose rests on
   double trust = 0.0;                 ///< in the pose, 0 (predicted or unknown) to 1
   bool is_keyframe = false;
@@ -49,19 +51,34 @@ class Slam {
        std::shared_ptr<Segmenter> segmenter = nullptr,
        std::shared_ptr<const Vocabulary> vocabulary = nullptr);
 
+  /// Goes on from a map of an earlier flight: the camera is searched for in it. Call before the first frame.
+  /// Throws InputError if the map was made with another camera or other pyramid levels.
+  void continue_from(SavedMap saved);
+
+  /// A copy of the map, for save_map. In real-time mode only after finish().
+  SavedMap snapshot() const;
+
   /// Tracks a frame and, if it becomes a keyframe, maps it (in real-time mode: on another thread). mask:
   /// empty, or CV_8UC1 of the frame's size, nonzero where nothing may be used, beside what is found to move.
   /// Frames that cannot be used (wrong size or type, time not increasing) give nothing and are counted.
+  /// Throws OptionsError if there is no map and keyframes.enabled is false.
   std::optional<FrameResult> process(const Frame& frame, const cv::Mat& mask = {});
 
   /// Waits for mapping and loop closing. Call before reading results.
   void finish();
 
-  /// Poses of all tracked frames, with every later correction of the map, in the order of time.
+  /// Of several worlds that never met, the one with most tracked frames.
+  WorldId main_world() const;
+
+  /// Poses of all frames tracked in the main world, with every later correction of the map, in the order of
+  /// time.
   Trajectory trajectory() const;
 
-  /// Poses of the keyframes still in the map.
+  /// Poses of this flight's keyframes in the main world that are still in the map.
   Trajectory keyframes() const;
+
+  /// Frames tracked in each other world.
+  std::map<WorldId, std::size_t> frames_apart() const;
 
   /// The map. In real-time mode only after finish().
   const Map& map() const { return map_; }
@@ -97,6 +114,8 @@ class Slam {
   void close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   std::vector<KeyframeId> similar_keyframes(const ObservedFrame& view) const;
   void follow_correction();
+  void follow_world(const TrackedFrame& frame);
+  std::map<WorldId, std::size_t> frames_by_world() const;
   bool is_usable(const Frame& frame);
   Removal find_movables(const Frame& frame, const cv::Mat& grey);
   std::shared_ptr<const ObservedFrame> extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& mask,
@@ -129,6 +148,7 @@ class Slam {
   // Where the camera was taken to be in the world as it was by then.
   std::optional<SE3> last_T_camera_world_;
   std::size_t followed_corrections_ = 0;
+  KeyframeId last_reference_;  // of the last frame that was tracked
   // Last, so that their threads stop before what they use goes away.
   KeyframeWorker closing_;
   KeyframeWorker mapping_;

@@ -18,6 +18,7 @@ BagOfWords PlaceIndex::describe(const ObservedFrame& view) const {
 }
 
 void PlaceIndex::add(KeyframeId keyframe, BagOfWords bag) {
+  std::erase_if(bag, [this](const auto& entry) { return entry.first >= having_.size(); });
   if (find(keyframe) != nullptr || bag.empty()) return;
   if (keyframe.index() >= bags_.size()) bags_.resize(keyframe.index() + 1);
   for (const auto& [word, weight] : bag) having_[word].push_back({keyframe, weight});
@@ -32,6 +33,12 @@ void PlaceIndex::remove(KeyframeId keyframe) {
   }
   bags_[keyframe.index()] = {};
   --size_;
+}
+
+void PlaceIndex::retain(const std::function<bool(KeyframeId)>& keeps) {
+  for (std::uint32_t i = 0; i < bags_.size(); ++i) {
+    if (!bags_[i].empty() && !keeps(KeyframeId{i})) remove(KeyframeId{i});
+  }
 }
 
 const BagOfWords* PlaceIndex::find(KeyframeId keyframe) const {

@@ -26,9 +26,12 @@ class PlaceIndex {
   /// The words of a view, without points on things that may move.
   BagOfWords describe(const ObservedFrame& view) const;
 
-  /// Does nothing if the keyframe is in already.
+  /// Does nothing if the keyframe is in already, or has no words. Words beyond the vocabulary are left out.
   void add(KeyframeId keyframe, BagOfWords bag);
   void remove(KeyframeId keyframe);
+
+  /// Removes those that are not to be kept.
+  void retain(const std::function<bool(KeyframeId)>& keeps);
 
   /// Nullptr if the keyframe is not in.
   const BagOfWords* find(KeyframeId keyframe) const;

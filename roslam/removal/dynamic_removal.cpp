@@ -258,6 +258,11 @@ void DynamicRemoval::move_world(const SE3& T_new_old) {
   history_.move_world(T_new_old);
 }
 
+void DynamicRemoval::leave_world() {
+  for (auto& past : past_) past.T_camera_world.reset();
+  history_.clear();
+}
+
 void DynamicRemoval::remember(const std::optional<SE3>& T_camera_world, std::vector<cv::Point2f> points,
                               std::vector<cv::Point2f> removed_points) {
   current_.T_camera_world = T_camera_world;

@@ -63,6 +63,9 @@ class DynamicRemoval {
   /// Tells that the map was corrected: what was remembered lies elsewhere now.
   void move_world(const SE3& T_new_old);
 
+  /// Tells that the camera is in another world, which lies to the one remembered nobody knows how.
+  void leave_world();
+
   /// Labels that could not be used so far, by reason in words.
   const std::map<std::string, std::size_t>& faults() const { return faults_; }
   std::size_t flickers() const { return memory_.flickers(); }

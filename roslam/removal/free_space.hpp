@@ -46,6 +46,9 @@ class FreeSpaceHistory {
   /// Takes over a correction of the world: the same points, elsewhere.
   void move_world(const SE3& T_new_old);
 
+  /// Forgets all: the world is another now.
+  void clear() { views_.clear(); }
+
   bool empty() const { return views_.empty(); }
 
  private:

@@ -34,8 +34,8 @@ KeyframePolicy::KeyframePolicy(const KeyframePolicyOptions& options) : options_(
 }
 
 bool KeyframePolicy::promotes(const TrackedFrame& frame, const Map& map, bool mapper_idle) const {
-  if (frame.state != TrackingState::kTracking) return false;
-  if (map.keyframe_count() == 0) return true;
+  if (!options_.enabled || frame.state != TrackingState::kTracking) return false;
+  if (!frame.reference.is_valid()) return true;  // a world begins
   const double elapsed = frame.timestamp - last_timestamp_;
   if (elapsed < options_.min_interval) return false;
 

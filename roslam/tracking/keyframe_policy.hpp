@@ -9,6 +9,7 @@
 namespace roslam {
 
 struct KeyframePolicyOptions {
+  bool enabled = true;         ///< false: no frame becomes a keyframe, the map stays as it is
   double max_interval = 1.0;   ///< seconds after which a keyframe is taken if the mapper is idle
   double min_interval = 0.0;   ///< seconds between keyframes at least
   double min_overlap = 0.6;    ///< share of the reference keyframe's landmarks below which a new one is due

@@ -52,6 +52,7 @@ void TrackerOptions::validate() const {
     throw OptionsError("tracker.hidden_share must be 0 to 1");
   if (!(max_predicted >= 0.0 && max_predicted <= 60.0))
     throw OptionsError("tracker.max_predicted must be 0 to 60 seconds");
+  if (new_world_frames < 0) throw OptionsError("tracker.new_world_frames must not be negative");
   if (recently_lost_frames < 0) throw OptionsError("tracker.recently_lost_frames must not be negative");
 }
 
@@ -79,18 +80,23 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   frame.timestamp = timestamp;
   frame.landmarks.resize(view->size());
   frame.view = std::move(view);
-  if (map_.keyframe_count() == 0) return initialise(std::move(frame));
+  if (map_.keyframe_count() == 0) {
+    return can_start(frame) ? initialise(std::move(frame)) : frame;
+  }
 
   const bool was_known = state_ == TrackingState::kTracking || state_ == TrackingState::kPredicted;
   const bool found = (was_known && follow(frame, hint.T_camera_world)) || relocalise(frame, hint);
   if (found) {
     state_ = TrackingState::kTracking;
-    frames_lost_ = 0;
+    frames_lost_ = frames_unrecognised_ = 0;
     frame.trust = std::min(1.0, frame.inliers / static_cast<double>(settings_.tracker.trusted_inliers));
     count_predictions(frame);
     remember(frame);
   } else if (was_known && predict_hidden(frame, hint)) {
     state_ = TrackingState::kPredicted;
+  } else if (const bool could_start = can_start(frame);
+             could_start && ++frames_unrecognised_ == settings_.tracker.new_world_frames) {
+    return initialise(std::move(frame));
   } else {
     ++frames_lost_;
     state_ = frames_lost_ <= settings_.tracker.recently_lost_frames ? TrackingState::kRecentlyLost
@@ -104,16 +110,23 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   return frame;
 }
 
-TrackedFrame Tracker::initialise(TrackedFrame frame) {
+bool Tracker::can_start(const TrackedFrame& frame) const {
   const auto& depths = frame.view->depths;
   const auto known = std::count_if(depths.begin(), depths.end(), [](float d) { return d > 0.0F; });
-  if (known >= settings_.tracker.min_initial_points) {
-    frame.T_camera_world = first_T_camera_world();
-    frame.trust = 1.0;
-    state_ = TrackingState::kTracking;
-    last_ = frame;
-  }
-  frame.state = state_;
+  return known >= settings_.tracker.min_initial_points;
+}
+
+// The first frame of a world.
+TrackedFrame Tracker::initialise(TrackedFrame frame) {
+  frame.T_camera_world = first_T_camera_world();
+  frame.landmarks.assign(frame.view->size(), {});
+  frame.reference = {};
+  frame.inliers = 0;
+  frame.trust = 1.0;
+  frame.state = state_ = TrackingState::kTracking;
+  frames_lost_ = frames_unrecognised_ = 0;
+  velocity_.reset();
+  last_ = frame;
   return frame;
 }
 
@@ -320,8 +333,10 @@ bool Tracker::predict_hidden(TrackedFrame& frame, const FrameHint& hint) {
 bool Tracker::relocalise(TrackedFrame& frame, const FrameHint& hint) {
   const Stopwatch watch;
   const auto similar = hint.similar_keyframes ? hint.similar_keyframes() : std::vector<KeyframeId>{};
-  const auto found = relocaliser_.find(map_, *frame.view, camera_, similar,
-                                       frames_lost_ >= settings_.tracker.recently_lost_frames);
+  // Never known, as at the start in a map of another flight, the camera may be anywhere.
+  const bool may_be_anywhere =
+      last_.view == nullptr || frames_lost_ >= settings_.tracker.recently_lost_frames;
+  const auto found = relocaliser_.find(map_, *frame.view, camera_, similar, may_be_anywhere);
   times_.relocalise += watch.seconds();
   if (!found) return false;
   frame.T_camera_world = found->T_camera_world;

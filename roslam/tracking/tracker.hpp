@@ -40,6 +40,8 @@ struct TrackerOptions {
       0.5;  ///< of the picture that must be hidden for a pose to be predicted where tracking fails
   double max_predicted = 1.5;     ///< seconds for which it may be
   int recently_lost_frames = 30;  ///< frames after which recently lost becomes lost
+  int new_world_frames = 30;  ///< frames with points enough for a start that are not recognised, after which
+                              ///< a new world is begun; 0: never
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -64,12 +66,12 @@ struct TrackedFrame {
   int inliers = 0;                    ///< landmarks the pose rests on
   double trust = 0.0;    ///< 0 (predicted or unknown) to 1 (on trusted_inliers or more landmarks)
   int hidden = 0;        ///< landmarks of the reference that lie behind what was removed
-  KeyframeId reference;  ///< keyframe that shares most landmarks; none before the first keyframe
+  KeyframeId reference;  ///< keyframe that shares most landmarks; none where a world begins
 };
 
 /// Estimates the pose of each frame against the map: predicts it from the motion so far, matches with the
-/// last frame, then with the local map; recovers against the keyframes when lost. Changes nothing in the map
-/// but the landmarks' counters of predicted and found.
+/// last frame, then with the local map; recovers against the keyframes when lost, and begins a new world
+/// where that fails for long. Changes nothing in the map but the landmarks' counters of predicted and found.
 class Tracker {
  public:
   struct Settings {
@@ -94,7 +96,7 @@ class Tracker {
   void promoted(KeyframeId keyframe);
 
   /// T_camera_world of the last frame whose pose was known, in the world as the map has it now; nothing
-  /// before the first keyframe.
+  /// before the first such frame.
   std::optional<SE3> last_pose() const;
 
   TrackingState state() const { return state_; }
@@ -112,6 +114,7 @@ class Tracker {
   const Times& times() const { return times_; }
 
  private:
+  bool can_start(const TrackedFrame& frame) const;
   TrackedFrame initialise(TrackedFrame frame);
   bool follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_world);
   bool match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor);
@@ -143,6 +146,7 @@ class Tracker {
   std::vector<std::uint32_t> passing_points_;
   std::vector<Eigen::Vector3d> passing_positions_;  // world, metres
   int frames_lost_ = 0;
+  int frames_unrecognised_ = 0;  // of these, frames that a world could have begun with
   Times times_;
 };
 

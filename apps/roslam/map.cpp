@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/roslam/commands.hpp"
+#include "apps/roslam/output.hpp"
+#include "apps/roslam/progress.hpp"
+#include "roslam/atlas/map_file.hpp"
+#include "roslam/atlas/merge_maps.hpp"
+#include "roslam/error.hpp"
+#include "roslam/geometry/trajectory.hpp"
+#include "roslam/map/map_ply.hpp"
+#include "roslam/pipeline/options.hpp"
+#include "roslam/write_file.hpp"
+
+namespace roslam::app {
+
+namespace {
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// The world with most keyframes.
+WorldId main_world(const Map& map) {
+  std::map<WorldId, std::size_t> sizes;
+  for (const KeyframeId id : map.keyframe_ids()) ++sizes[map.find(id)->world];
+  const auto largest = std::max_element(sizes.begin(), sizes.end(),
+                                        [](const auto& a, const auto& b) { return a.second < b.second; });
+  return largest != sizes.end() ? largest->first : WorldId{0};
+}
+
+// Metres along x, y and z within which the landmarks of the main world lie, but for the farthest hundredths.
+Eigen::Vector3d extent(const Map& map) {
+  const WorldId world = main_world(map);
+  std::array<std::vector<double>, 3> coordinates;
+  for (const LandmarkId id : map.landmark_ids()) {
+    const Landmark& landmark = *map.find(id);
+    if (map.world_of(landmark.observations.front().keyframe) != world) continue;
+    for (int axis = 0; axis < 3; ++axis)
+      coordinates[static_cast<std::size_t>(axis)].push_back(landmark.position[axis]);
+  }
+  Eigen::Vector3d result = Eigen::Vector3d::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    auto& values = coordinates[static_cast<std::size_t>(axis)];
+    if (values.empty()) continue;
+    std::sort(values.begin(), values.end());
+    const std::size_t tail = values.size() / 100;
+    result[axis] = values[values.size() - 1 - tail] - values[tail];
+  }
+  return result;
+}
+
+std::string words_of(const SavedMap& saved) {
+  if (saved.vocabulary == 0) return "none; made when the map is used";
+  const fs::path shipped = shipped_vocabulary();
+  const bool is_shipped = !shipped.empty() && Vocabulary::load(shipped).fingerprint() == saved.vocabulary;
+  return is_shipped ? "of the vocabulary that comes with the program"
+                    : "of another vocabulary; made anew when the map is used";
+}
+
+Json describe(const fs::path& file, const SavedMap& saved) {
+  const Camera& camera = saved.camera;
+  const Map& map = saved.map;
+  const Eigen::Vector3d size = extent(map);
+  return {{"file", file.string()},
+          {"bytes", fs::file_size(file)},
+          {"camera",
+           {{"width", camera.width},
+            {"height", camera.height},
+            {"fx", camera.fx},
+            {"fy", camera.fy},
+            {"cx", camera.cx},
+            {"cy", camera.cy},
+            {"distortion", camera.distortion}}},
+          {"keyframes", map.keyframe_count()},
+          {"landmarks", map.landmark_count()},
+          {"loops", map.loops().size()},
+          {"flights", map.keyframe_count() > 0 ? map.flight() + 1 : 0},
+          {"worlds", map.worlds().size()},
+          {"extent_metres", {size.x(), size.y(), size.z()}},
+          {"words", words_of(saved)}};
+}
+
+struct InfoArguments {
+  fs::path file;
+  bool json = false;
+};
+
+void show_info(const InfoArguments& arguments) {
+  const Json info = describe(arguments.file, load_map(arguments.file));
+  if (arguments.json) {
+    std::cout << info.dump(-1, ' ', false, Json::error_handler_t::replace) << "\n";
+  } else {
+    const Json& camera = info["camera"];
+    const Json& size = info["extent_metres"];
+    std::printf("camera: %d x %d, fx %g, fy %g, cx %g, cy %g\n", camera["width"].get<int>(),
+                camera["height"].get<int>(), camera["fx"].get<double>(), camera["fy"].get<double>(),
+                camera["cx"].get<double>(), camera["cy"].get<double>());
+    std::printf("keyframes: %zu, flights: %zu\nlandmarks: %zu, within %.1f x %.1f x %.1f m\n",
+                info["keyframes"].get<std::size_t>(), info["flights"].get<std::size_t>(),
+                info["landmarks"].get<std::size_t>(), size[0].get<double>(), size[1].get<double>(),
+                size[2].get<double>());
+    std::printf("loops: %zu\n", info["loops"].get<std::size_t>());
+    if (const auto worlds = info["worlds"].get<std::size_t>(); worlds > 1)
+      std::printf("parts that never met: %zu\n", worlds);
+    std::printf("words: %s\nsize: %.1f MB\n", info["words"].get<std::string>().c_str(),
+                info["bytes"].get<double>() / 1048576.0);
+  }
+  require_written_output();
+}
+
+void add_info_command(CLI::App& map) {
+  const auto arguments = std::make_shared<InfoArguments>();
+  CLI::App* command = map.add_subcommand("info", "Say what a map holds");
+  command->footer("Example:\n  roslam map info live/map.roslam");
+  command->add_option("MAP", arguments->file, "Map that roslam run wrote")->required();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->callback([arguments] { show_info(*arguments); });
+}
+
+struct MergeArguments {
+  std::vector<std::string> maps;
+  fs::path out;
+  std::string vocabulary;
+  std::string config;
+  bool quiet = false;
+  bool json = false;
+};
+
+void merge(const MergeArguments& arguments) {
+  const Options options = arguments.config.empty() ? Options{} : read_options(arguments.config);
+  const fs::path words = arguments.vocabulary.empty() ? shipped_vocabulary() : fs::path(arguments.vocabulary);
+  if (words.empty()) {
+    throw InputError(
+        "models/roslam-orb.vocabulary: not found beside the program; install it or name it with "
+        "--vocabulary");
+  }
+  const auto vocabulary = std::make_shared<const Vocabulary>(Vocabulary::load(words));
+  SavedMap merged = load_map(arguments.maps.front());
+  for (std::size_t i = 1; i < arguments.maps.size(); ++i) {
+    const SavedMap next = load_map(arguments.maps[i]);
+    Progress progress(next.map.keyframe_count(), arguments.quiet || arguments.json);
+    merged = merge_maps(merged, next, vocabulary, options.loop_settings(),
+                        [&](std::size_t done) { progress.show(done, "keyframes searched for"); });
+  }
+  save_map(arguments.out, merged);
+  const Map& map = merged.map;
+  if (arguments.json) {
+    std::cout << describe(arguments.out, merged).dump(-1, ' ', false, Json::error_handler_t::replace) << "\n";
+  } else {
+    std::printf("map: %zu keyframes, %zu landmarks, %zu loops\nresults: %s\n", map.keyframe_count(),
+                map.landmark_count(), map.loops().size(), arguments.out.c_str());
+  }
+  require_written_output();
+}
+
+void add_merge_command(CLI::App& map) {
+  const auto arguments = std::make_shared<MergeArguments>();
+  CLI::App* command = map.add_subcommand("merge", "Make one map of several that overlap");
+  command->footer(
+      "Example:\n"
+      "  roslam map merge monday/map.roslam tuesday/map.roslam --out street.roslam\n"
+      "Coordinates are those of the first. Maps that show no place in common are refused.");
+  command->add_option("MAPS", arguments->maps, "Two maps or more, of one camera")
+      ->required()
+      ->expected(2, 1000);
+  command->add_option("--out", arguments->out, "File the merged map is written to")->required();
+  command->add_option("--vocabulary", arguments->vocabulary,
+                      "Words that places are recognised by, in place of those that come with the program");
+  command->add_option("--config", arguments->config, "YAML file with options, as of roslam run");
+  command->add_flag("--quiet", arguments->quiet, "No progress");
+  command->add_flag("--json", arguments->json, "Print what the map holds as one JSON object");
+  command->callback([arguments] { merge(*arguments); });
+}
+
+struct ExportArguments {
+  fs::path file;
+  fs::path ply;
+  fs::path keyframes;
+  fs::path camera;
+  std::optional<std::uint32_t> flight;
+};
+
+void export_map(const ExportArguments& arguments) {
+  if (arguments.ply.empty() && arguments.keyframes.empty() && arguments.camera.empty()) {
+    throw CLI::ValidationError("roslam map export", "needs --ply, --keyframes or --camera");
+  }
+  const SavedMap saved = load_map(arguments.file);
+  const Map& map = saved.map;
+  const WorldId world = main_world(map);
+  if (!arguments.ply.empty()) write_map_ply(arguments.ply, map, world);
+  if (!arguments.camera.empty()) write_file(arguments.camera, camera_to_yaml(saved.camera));
+  if (!arguments.keyframes.empty()) {
+    const std::uint32_t flight = arguments.flight.value_or(map.flight());
+    Trajectory trajectory;
+    for (const KeyframeId id : map.keyframe_ids()) {
+      const Keyframe& keyframe = *map.find(id);
+      if (keyframe.flight != flight || keyframe.world != world) continue;
+      trajectory.push_back({keyframe.timestamp, keyframe.T_camera_world.inverse()});
+    }
+    if (trajectory.empty() && arguments.flight) {
+      throw InputError(arguments.file.string() + ": no keyframe of flight " + std::to_string(flight) +
+                       "; roslam map info tells how many flights there are, counted from 0");
+    }
+    write_trajectory(arguments.keyframes, trajectory);
+  }
+  require_written_output();
+}
+
+void add_export_command(CLI::App& map) {
+  const auto arguments = std::make_shared<ExportArguments>();
+  CLI::App* command = map.add_subcommand("export", "Write what a map holds in formats of other programs");
+  command->footer(
+      "Example:\n"
+      "  roslam map export street.roslam --ply street.ply --keyframes keyframes.txt --camera camera.yaml\n"
+      "Of parts that never met, the largest is written.");
+  command->add_option("MAP", arguments->file, "Map that roslam run wrote")->required();
+  command->add_option("--ply", arguments->ply, "Landmarks with colour (binary PLY)");
+  command->add_option("--keyframes", arguments->keyframes, "Poses of a flight's keyframes (TUM format)");
+  command->add_option("--flight", arguments->flight,
+                      "Flight whose keyframes are written, from 0; default the newest");
+  command->add_option("--camera", arguments->camera, "Calibration, a file for --camera of roslam run");
+  command->callback([arguments] { export_map(*arguments); });
+}
+}  // namespace
+
+void add_map_command(CLI::App& program) {
+  CLI::App* map = program.add_subcommand("map", "Look into, merge or export maps that runs wrote");
+  map->require_subcommand(1);
+  add_info_command(*map);
+  add_merge_command(*map);
+  add_export_command(*map);
+}
+
+}  // namespace roslam::app

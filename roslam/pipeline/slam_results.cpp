@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
+#include "roslam/pipeline/slam.hpp"
+
+namespace roslam {
+
+SavedMap Slam::snapshot() const { return SavedMap::of(camera_, map_, places_ ? &*places_ : nullptr); }
+
+std::vector<ClosedLoop> Slam::loops() const {
+  return loop_closer_ ? loop_closer_->closed() : std::vector<ClosedLoop>{};
+}
+
+std::size_t Slam::refused_loops() const { return loop_closer_ ? loop_closer_->refused() : 0; }
+
+std::map<std::string, std::size_t> Slam::labelling_faults() const {
+  auto faults = segmentation_.faults();
+  for (const auto& [reason, count] : removal_.faults()) faults[reason] += count;
+  if (removal_.flickers() > 0) faults["labels come and go"] += removal_.flickers();
+  return faults;
+}
+
+std::map<WorldId, std::size_t> Slam::frames_by_world() const {
+  std::map<WorldId, std::size_t> frames;
+  for (const auto& record : records_) {
+    if (record.reference.is_valid()) ++frames[map_.world_of(record.reference)];
+  }
+  return frames;
+}
+
+WorldId Slam::main_world() const {
+  const auto frames = frames_by_world();
+  const auto most = std::max_element(frames.begin(), frames.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  return most != frames.end() ? most->first : WorldId{0};
+}
+
+std::map<WorldId, std::size_t> Slam::frames_apart() const {
+  auto frames = frames_by_world();
+  frames.erase(main_world());
+  return frames;
+}
+
+Trajectory Slam::trajectory() const {
+  Trajectory result;
+  const WorldId world = main_world();
+  for (const auto& record : records_) {
+    if (!record.reference.is_valid() || map_.world_of(record.reference) != world) continue;
+    const SE3 T_camera_world = record.T_camera_reference * map_.T_camera_world(record.reference);
+    result.push_back({record.timestamp, T_camera_world.inverse()});
+  }
+  return result;
+}
+
+Trajectory Slam::keyframes() const {
+  Trajectory result;
+  const WorldId world = main_world();
+  for (const KeyframeId id : map_.keyframe_ids()) {
+    const Keyframe& keyframe = *map_.find(id);
+    if (keyframe.flight != map_.flight() || keyframe.world != world) continue;
+    result.push_back({keyframe.timestamp, keyframe.T_camera_world.inverse()});
+  }
+  return result;
+}
+
+StageTimes Slam::times() const {
+  StageTimes all = times_;
+  all.add_all(mapping_.times());
+  all.add_all(closing_.times());
+  all.add_all(segmentation_.times());
+  return all;
+}
+
+}  // namespace roslam
