@@ -79,7 +79,7 @@ TEST_F(LoopTest, IsNotFooledByAWallThatRepeats) {
 TEST_F(LoopTest, ClosesNoneWhereItsOptionsForbid) {
   flight_.build_ring();
   Options options;
-  options.place_check.min_inliers = 1000;
+  options.loop.min_inliers = 1000;
   use(options);
   fly_ring(2.0 * M_PI + 0.5);
   EXPECT_TRUE(closer_->closed().empty());
@@ -101,13 +101,14 @@ TEST_F(LoopTest, FindsWhereAViewIs) {
   const Options options;
   PlaceCheck check(flight_.camera(), options.loop_settings().place);
   const SE3 T_camera_world = WallFlight::on_ring(0.43);
-  const auto match = check.match(map_, KeyframeId{8}, *flight_.view(T_camera_world));
+  const auto match =
+      check.match(map_, KeyframeId{8}, *flight_.view(T_camera_world), options.loop.min_inliers);
   ASSERT_TRUE(match);
   EXPECT_EQ(match->place, KeyframeId{8});
   EXPECT_LT((match->T_camera_world * T_camera_world.inverse()).log().norm(), 0.02);
-  EXPECT_GE(match->inliers, options.place_check.min_inliers);
-  EXPECT_FALSE(check.match(map_, KeyframeId{0}, *flight_.view(WallFlight::on_ring(3.0))));
-  EXPECT_FALSE(check.match(map_, KeyframeId{100}, *flight_.view(T_camera_world)));
+  EXPECT_GE(match->inliers, options.loop.min_inliers);
+  EXPECT_FALSE(check.match(map_, KeyframeId{0}, *flight_.view(WallFlight::on_ring(3.0)), 20));
+  EXPECT_FALSE(check.match(map_, KeyframeId{100}, *flight_.view(T_camera_world), 20));
 }
 
 TEST_F(LoopTest, ACorrectionMovesWhatCameAfterItWasWorkedOut) {

@@ -42,11 +42,41 @@ TEST(ReprojectionError, IsZeroAtTheTruthAndOneSigmaOff) {
   EXPECT_NEAR((ReprojectionError{camera, shifted}.error(point)).x(), -1.0, 1e-4);
 }
 
+// What fits many noisy depths best must not lie nearer or farther than the truth: it would shrink the world.
+TEST(ReprojectionError, NoisyDisparitiesAverageToTheTrueDepth) {
+  const Camera camera;
+  const MeasurementNoise noise;
+  constexpr double kTruth = 8.0;
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal(1.0 / kTruth, 0.03 / kTruth);
+  std::vector<Measurement> measurements;
+  for (int i = 0; i < 20000; ++i) {
+    measurements.push_back(Measurement::make({0, 0}, static_cast<float>(1.0 / normal(random)), 1.0F, noise));
+  }
+  double depth = 7.0;
+  for (int step = 0; step < 10; ++step) {
+    double gradient = 0.0;
+    double curvature = 0.0;
+    for (const auto& measurement : measurements) {
+      const ReprojectionError term{camera, measurement};
+      const double j = term.jacobian({0, 0, depth})(2, 2);
+      gradient += j * term.error({0, 0, depth}).z();
+      curvature += j * j;
+    }
+    depth -= gradient / curvature;
+  }
+  EXPECT_NEAR(depth, kTruth, 0.001 * kTruth);
+}
+
 TEST(MeasurementNoise, DepthCountsLessFarAway) {
   const MeasurementNoise noise;
-  const Measurement near = Measurement::make({0, 0}, 1.0F, 1.0F, noise);
-  const Measurement far = Measurement::make({0, 0}, 6.0F, 1.0F, noise);
-  EXPECT_GT(near.depth_weight, 3.0 * far.depth_weight);
+  const Camera camera;
+  const auto error_of = [&](float measured, double true_depth) {
+    const Measurement measurement = Measurement::make({0, 0}, measured, 1.0F, noise);
+    return std::abs(ReprojectionError{camera, measurement}.error({0, 0, true_depth}).z());
+  };
+  EXPECT_GT(error_of(1.1F, 1.0), 3.0 * error_of(6.1F, 6.0));
+  EXPECT_NEAR(error_of(4.0F, 4.0 + noise.sigma_of_depth(4.0)), 1.0, 0.05);
   EXPECT_FALSE(Measurement::make({0, 0}, 0.0F, 1.0F, noise).has_depth());
 }
 

@@ -26,14 +26,15 @@ Measurement Measurement::make(const Eigen::Vector2f& pixel, float depth, float s
   m.depth = depth;
   m.pixel_weight = 1.0 / (noise.pixel_sigma * scale);
   m.outlier_factor = noise.outlier_factor;
-  m.depth_weight = depth > 0.0F ? 1.0 / noise.sigma_of_depth(depth) : 0.0;
+  m.depth_weight = depth > 0.0F ? m.depth * m.depth / noise.sigma_of_depth(m.depth) : 0.0;
   return m;
 }
 
 Eigen::Vector3d ReprojectionError::error(const Eigen::Vector3d& point_camera) const {
   const Eigen::Vector2d pixel = camera.project(point_camera) - measurement.pixel;
+  const double nearness = measurement.has_depth() ? 1.0 / measurement.depth - 1.0 / point_camera.z() : 0.0;
   return {measurement.pixel_weight * pixel.x(), measurement.pixel_weight * pixel.y(),
-          measurement.depth_weight * (point_camera.z() - measurement.depth)};
+          measurement.depth_weight * nearness};
 }
 
 Eigen::Matrix3d ReprojectionError::jacobian(const Eigen::Vector3d& p) const {
@@ -43,7 +44,7 @@ Eigen::Matrix3d ReprojectionError::jacobian(const Eigen::Vector3d& p) const {
   Eigen::Matrix3d j;
   j << x_scale, 0.0, -x_scale * p.x() * inverse_z,  //
       0.0, y_scale, -y_scale * p.y() * inverse_z,   //
-      0.0, 0.0, measurement.depth_weight;
+      0.0, 0.0, measurement.depth_weight * inverse_z * inverse_z;
   return j;
 }
 

@@ -31,7 +31,7 @@ struct Measurement {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< lens distortion removed
   double depth = 0.0;                               ///< metres along the optical axis, 0 = unknown
   double pixel_weight = 1.0;                        ///< 1 / sigma, 1/pixel
-  double depth_weight = 0.0;                        ///< 1 / sigma, 1/metre; 0 = no depth
+  double depth_weight = 0.0;                        ///< 1 / sigma of 1 / depth, metres; 0 = no depth
   double outlier_factor = 1.0;                      ///< times the chi-squared limit that make an outlier
 
   static Measurement make(const Eigen::Vector2f& pixel, float depth, float scale,
@@ -48,8 +48,11 @@ inline double chi_squared_limit(const Measurement& m) { return m.has_depth() ? k
 /// Squared error above which a measurement is an outlier rather than a bad fit (see MeasurementNoise).
 inline double outlier_limit(const Measurement& m) { return m.outlier_factor * chi_squared_limit(m); }
 
-/// The error of a measurement: (pixel x, pixel y, depth), each divided by its sigma; the depth row is 0 where
-/// depth is unknown. All of it refers to the point's coordinates in the camera frame (z > 0).
+/// The error of a measurement: (pixel x, pixel y, inverse depth), each divided by its sigma; the last row is
+/// 0 where depth is unknown. All of it refers to the point's coordinates in the camera frame (z > 0). Depth
+/// cameras measure disparity, whose noise does not depend on distance. Errors of depth itself, each weighed
+/// by the sigma at what was measured, would trust what came out too near more than what came out too far and
+/// shrink the world.
 struct ReprojectionError {
   const Camera& camera;
   const Measurement& measurement;

@@ -25,7 +25,6 @@ LoopCloser::LoopCloser(const Camera& camera, Map& map, PlaceIndex& places, std::
       detector_(settings.detector, PlaceCheck(camera, settings.place)) {
   settings.closer.validate();
   settings.pose_graph.validate();
-  settings.place.check.validate();
 }
 
 void LoopCloser::process(KeyframeId keyframe, const std::function<bool()>& should_stop) {

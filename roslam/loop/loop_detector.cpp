@@ -37,6 +37,7 @@ void LoopDetectorOptions::validate() const {
   };
   require(min_similarity >= 0.0 && min_similarity <= 1.0, "min_similarity must be 0 to 1");
   require(candidates >= 1, "candidates must be at least 1");
+  require(min_inliers >= 6, "min_inliers must be at least 6");
   require(min_shared >= 1, "min_shared must be at least 1");
   require(consistent >= 1, "consistent must be at least 1");
   require(patience >= 1, "patience must be at least 1 keyframe");
@@ -57,7 +58,7 @@ std::optional<Loop> LoopDetector::detect(const Map& map, const PlaceIndex& place
     return keyframe.value - suspicion.newest.value > static_cast<std::uint32_t>(options_.patience);
   });
   for (const KeyframeId place : candidates(map, places, keyframe)) {
-    const auto match = check_.match(map, place, *current->view);
+    const auto match = check_.match(map, place, *current->view, options_.min_inliers);
     if (!match || !is_plausible(map, keyframe, *match)) continue;
     if (support(map, keyframe, *match) >= options_.consistent) return Loop{keyframe, *match};
     break;

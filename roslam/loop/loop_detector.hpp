@@ -6,9 +6,9 @@
 #include <set>
 #include <vector>
 
-#include "roslam/loop/place_check.hpp"
 #include "roslam/map/map.hpp"
 #include "roslam/places/place_index.hpp"
+#include "roslam/tracking/place_check.hpp"
 
 namespace roslam {
 
@@ -16,6 +16,7 @@ struct LoopDetectorOptions {
   bool enabled = true;            ///< false: no place is recognised and no loop closed
   double min_similarity = 0.25;   ///< to a place, as a share of the similarity to the keyframe before
   int candidates = 3;             ///< places checked by geometry for one keyframe
+  int min_inliers = 60;           ///< landmarks of a place that must agree on the pose
   int min_shared = 15;            ///< landmarks two keyframes share to count as neighbours
   int consistent = 3;             ///< keyframes that must recognise places in the same way
   int patience = 3;               ///< keyframes between two of these at most

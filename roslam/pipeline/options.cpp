@@ -39,7 +39,7 @@ void Options::validate() const {
 Tracker::Settings Options::tracker_settings() const {
   TrackerOptions effective = tracker;
   if (!keyframes.enabled) effective.new_world_frames = 0;  // without keyframes there is none
-  return {effective, matcher, pose, local_map, relocaliser, noise};
+  return {effective, matcher, pose, local_map, place_check, relocaliser, noise};
 }
 
 DynamicRemoval::Settings Options::removal_settings() const { return {removal, depth, noise, pose}; }
@@ -49,7 +49,7 @@ LocalMapper::Settings Options::mapper_settings() const {
 }
 
 LoopCloser::Settings Options::loop_settings() const {
-  return {loop, loop_closer, pose_graph, {place_check, relocaliser, matcher, pose, noise}, fusion, bundle};
+  return {loop, loop_closer, pose_graph, {place_check, matcher, pose, noise}, fusion, bundle};
 }
 
 }  // namespace roslam

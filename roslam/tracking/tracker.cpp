@@ -62,7 +62,8 @@ Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
       settings_(settings),
       matcher_(settings.matcher),
       local_map_(settings.local_map),
-      relocaliser_(settings.relocaliser, settings.matcher) {
+      relocaliser_(settings.relocaliser, PlaceCheck(camera, {settings.place_check, settings.matcher,
+                                                             settings.pose, settings.noise})) {
   settings.tracker.validate();
   settings.matcher.validate();
   settings.pose.validate();
@@ -336,13 +337,13 @@ bool Tracker::relocalise(TrackedFrame& frame, const FrameHint& hint) {
   // Never known, as at the start in a map of another flight, the camera may be anywhere.
   const bool may_be_anywhere =
       last_.view == nullptr || frames_lost_ >= settings_.tracker.recently_lost_frames;
-  const auto found = relocaliser_.find(map_, *frame.view, camera_, similar, may_be_anywhere);
+  const auto found = relocaliser_.find(map_, *frame.view, similar, may_be_anywhere);
   times_.relocalise += watch.seconds();
   if (!found) return false;
   frame.T_camera_world = found->T_camera_world;
   frame.landmarks = found->landmarks;
   // A wrong place must not be taken for the right one: the local map has to confirm it twice as strongly.
-  return refine_with_local_map(frame, found->keyframe) && frame.inliers >= 2 * settings_.tracker.min_inliers;
+  return refine_with_local_map(frame, found->place) && frame.inliers >= 2 * settings_.tracker.min_inliers;
 }
 
 void Tracker::count_predictions(const TrackedFrame& frame) {

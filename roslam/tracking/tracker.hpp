@@ -79,6 +79,7 @@ class Tracker {
     MatcherOptions matcher;
     PoseOptimiserOptions pose;
     LocalMapOptions local_map;
+    PlaceCheckOptions place_check;
     RelocaliserOptions relocaliser;
     MeasurementNoise noise;
   };

@@ -9,7 +9,6 @@
 #include "roslam/geometry/pose_optimiser.hpp"
 #include "roslam/map/map.hpp"
 #include "roslam/tracking/projection_matcher.hpp"
-#include "roslam/tracking/relocaliser.hpp"
 
 namespace roslam {
 
@@ -22,20 +21,26 @@ struct PlaceMatch {
 };
 
 struct PlaceCheckOptions {
+  int match_distance = 64;     ///< bits, of matches searched over the whole picture
+  double match_ratio = 0.9;    ///< best to second best distance of these
+  int min_matches = 15;        ///< matches with a keyframe that make it worth a pose estimate
+  int min_agreeing = 7;        ///< of these that must agree on a pose
+  int iterations = 1000;       ///< RANSAC samples for a keyframe, at most
+  double max_error = 4.0;      ///< pixels a match may be off its reprojection
   int neighbours = 10;         ///< covisible keyframes whose landmarks are searched for, too
   double search_radius = 8.0;  ///< pixels at the finest level, about where the first pose puts a landmark
-  int min_inliers = 60;        ///< landmarks that must agree on the pose
 
   /// Throws OptionsError naming the field.
   void validate() const;
 };
 
-/// Decides whether views show places, by geometry.
+/// Decides whether views show places, by geometry. Few matches that agree are enough for a first pose, as
+/// views of one place from two sides have no more: what decides is how many landmarks are found where it puts
+/// them.
 class PlaceCheck {
  public:
   struct Settings {
     PlaceCheckOptions check;
-    RelocaliserOptions recognise;
     MatcherOptions matcher;
     PoseOptimiserOptions pose;
     MeasurementNoise noise;
@@ -44,10 +49,13 @@ class PlaceCheck {
   PlaceCheck(const Camera& camera, const Settings& settings);
 
   /// Nothing if the view does not show what the keyframe and its neighbours see: too few matches, too few
-  /// that agree on a pose, or too few landmarks found where that pose puts them.
-  std::optional<PlaceMatch> match(const Map& map, KeyframeId place, const ObservedFrame& view);
+  /// that agree on a pose (P3P), or fewer than min_inliers landmarks found where that pose puts them.
+  std::optional<PlaceMatch> match(const Map& map, KeyframeId place, const ObservedFrame& view,
+                                  int min_inliers);
 
  private:
+  std::optional<PlaceMatch> first_pose(const Map& map, const Keyframe& keyframe,
+                                       const ObservedFrame& view) const;
   std::vector<LandmarkId> landmarks_around(const Map& map, KeyframeId place) const;
   void search(const Map& map, const std::vector<LandmarkId>& landmarks, const ObservedFrame& view,
               double radius, PlaceMatch& match);
