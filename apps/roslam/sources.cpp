@@ -32,6 +32,15 @@ void add_flight_options(CLI::App& command, SourceArguments& arguments) {
   command.add_option("--seed", arguments.seed, "Of a simulated flight")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  command.add_option("--speed", arguments.speed, "Of a simulated flight, metres a second")
+      ->capture_default_str();
+  command.add_option("--altitude", arguments.altitude, "Of a simulated flight, metres above the street")
+      ->capture_default_str();
+  command
+      .add_option("--aside", arguments.aside, "Of a simulated flight, metres to the left of the usual path")
+      ->capture_default_str();
+  command.add_option("--gain", arguments.gain, "Of a simulated flight: brightness, as under other light")
+      ->capture_default_str();
 }
 
 std::optional<SimulatorOptions> simulated_flight(const SourceArguments& arguments) {
@@ -50,6 +59,10 @@ std::optional<SimulatorOptions> simulated_flight(const SourceArguments& argument
   options.traffic = *traffic;
   options.frames = arguments.frames;
   options.seed = arguments.seed;
+  options.speed = arguments.speed;
+  options.altitude = arguments.altitude;
+  options.aside = arguments.aside;
+  options.gain = arguments.gain;
   return options;
 }
 

@@ -20,12 +20,16 @@ struct SourceArguments {
   std::string traffic = "light";  ///< of a simulation
   std::size_t frames = 0;         ///< of a simulation; 0 = the whole flight
   std::uint32_t seed = 1;         ///< of a simulation
+  double speed = 1.0;             ///< of a simulation, metres a second
+  double altitude = 3.5;          ///< of a simulation, metres
+  double aside = 0.0;             ///< of a simulation, metres
+  double gain = 1.0;              ///< of a simulation
 };
 
 /// Adds SOURCE and --camera to a command; the result is SOURCE.
 CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments);
 
-/// Adds --traffic, --frames and --seed.
+/// Adds what can be chosen of a simulated flight: --traffic, --frames, --seed and so on.
 void add_flight_options(CLI::App& command, SourceArguments& arguments);
 
 /// Opens what the user named. Throws InputError or CalibrationError.

@@ -1,40 +1,56 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/loop/essential_graph.hpp"
 
+#include <algorithm>
 #include <map>
 #include <set>
-#include <utility>
 
 namespace roslam {
 
-EssentialGraph EssentialGraph::of(const Map& map, int min_shared, const std::optional<LoopClosure>& closing) {
+EssentialGraph EssentialGraph::of(const Map& map, std::mutex& map_mutex, int min_shared,
+                                  const LoopClosure& closing) {
+  constexpr std::size_t kAtOnce = 20;  // keyframes read under one lock
+  constexpr std::size_t kNone = ~std::size_t{0};
   EssentialGraph result;
-  result.keyframes = map.keyframe_ids();
-  std::vector<std::size_t> node_of(map.keyframe_slots());
-  const std::set<KeyframeId> origins = map.origins();
-  for (const KeyframeId id : result.keyframes) {
-    node_of[id.index()] = result.graph.nodes.size();
-    result.graph.nodes.push_back({map.find(id)->T_camera_world, 1.0, origins.count(id) > 0});
-  }
-  const auto add_edge = [&](KeyframeId from, KeyframeId to, const SE3& T_to_from, bool is_loop) {
-    result.graph.edges.push_back({node_of[from.index()], node_of[to.index()], T_to_from, 1.0, 1.0, is_loop});
-  };
-  const auto T_as_is = [&](KeyframeId from, KeyframeId to) {
-    return map.find(to)->T_camera_world * map.find(from)->T_camera_world.inverse();
-  };
-  std::map<WorldId, KeyframeId> newest;  // keyframe of each world so far
-  for (const KeyframeId id : result.keyframes) {
-    const KeyframeId before = std::exchange(newest[map.find(id)->world], id);
-    bool has_parent = false;
-    for (const auto& [neighbour, shared] : map.covisible(id)) {  // most first
-      if (neighbour > id || (has_parent && shared < min_shared)) continue;
-      add_edge(neighbour, id, T_as_is(neighbour, id), false);
-      has_parent = true;
+  std::vector<std::size_t> node_of;
+  std::vector<WorldId> worlds;
+  std::vector<LoopClosure> loops;
+  {
+    const std::scoped_lock lock(map_mutex);
+    result.keyframes = map.keyframe_ids();
+    node_of.resize(map.keyframe_slots(), kNone);
+    const std::set<KeyframeId> origins = map.origins();
+    for (const KeyframeId id : result.keyframes) {
+      node_of[id.index()] = result.graph.nodes.size();
+      result.graph.nodes.push_back({map.find(id)->T_camera_world, 1.0, origins.count(id) > 0});
+      worlds.push_back(map.find(id)->world);
     }
-    if (!has_parent && before.is_valid()) add_edge(before, id, T_as_is(before, id), false);
+    loops = map.loops();
+    loops.push_back(closing);
   }
-  for (const auto& loop : map.loops()) add_edge(loop.from, loop.to, loop.T_to_from, true);
-  if (closing) add_edge(closing->from, closing->to, closing->T_to_from, true);
+  auto& [nodes, edges] = result.graph;
+  // Poses are those of the moment when the nodes were read: the mapper may move keyframes meanwhile.
+  const auto tie = [&](std::size_t from, std::size_t to) {
+    edges.push_back({from, to, nodes[to].T_node_world * nodes[from].T_node_world.inverse(), 1.0, 1.0, false});
+  };
+  std::map<WorldId, std::size_t> newest;  // node of each world so far
+  for (std::size_t begin = 0; begin < nodes.size(); begin += kAtOnce) {
+    const std::scoped_lock lock(map_mutex);
+    for (std::size_t node = begin; node < std::min(begin + kAtOnce, nodes.size()); ++node) {
+      bool has_parent = false;
+      for (const auto& [neighbour, shared] : map.covisible(result.keyframes[node])) {  // most first
+        const std::size_t other = neighbour.index() < node_of.size() ? node_of[neighbour.index()] : kNone;
+        if (other >= node || (has_parent && shared < min_shared)) continue;
+        tie(other, node);
+        has_parent = true;
+      }
+      const auto before = newest.find(worlds[node]);
+      if (!has_parent && before != newest.end()) tie(before->second, node);
+      newest[worlds[node]] = node;
+    }
+  }
+  for (const auto& [from, to, T_to_from] : loops)
+    edges.push_back({node_of[from.index()], node_of[to.index()], T_to_from, 1.0, 1.0, true});
   return result;
 }
 

@@ -53,7 +53,7 @@ MapCorrection GlobalBundle::correction(const BundleProblem& before) const {
         before.poses[i].T_camera_world.inverse() * problem.poses[i].T_camera_world;
   }
   for (std::size_t p = 0; p < landmarks.size(); ++p) {
-    result.positions.emplace_hint(result.positions.end(), landmarks[p], problem.points[p]);
+    result.positions.emplace_back(landmarks[p], problem.points[p]);
   }
   return result;
 }

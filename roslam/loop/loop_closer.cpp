@@ -54,11 +54,13 @@ std::optional<Loop> LoopCloser::recognise(KeyframeId keyframe) {
     view = current->view;
   }
   BagOfWords bag = places_.describe(*view);
-  const std::scoped_lock lock(map_mutex_);
-  // So that the index grows with the map, not with time.
-  places_.retain([this](KeyframeId id) { return map_.find(id) != nullptr; });
-  places_.add(keyframe, std::move(bag));
-  return detector_.detect(map_, places_, keyframe);
+  {
+    const std::scoped_lock lock(map_mutex_);
+    // So that the index grows with the map, not with time.
+    places_.retain([this](KeyframeId id) { return map_.find(id) != nullptr; });
+    places_.add(keyframe, std::move(bag));
+  }
+  return detector_.detect(map_, places_, map_mutex_, keyframe);
 }
 
 // False if keyframe and place are of one world.
@@ -97,14 +99,13 @@ void LoopCloser::note(const Loop& loop, const SE3& T_camera_old, bool joins) {
 
 bool LoopCloser::straighten(const Loop& loop, const std::function<bool()>& should_stop) {
   LoopClosure closing{loop.match.place, loop.keyframe, {}};
-  EssentialGraph essential;
   {
     const std::scoped_lock lock(map_mutex_);
     const Keyframe* place = map_.find(closing.from);
     if (place == nullptr || map_.find(closing.to) == nullptr) return false;
     closing.T_to_from = loop.match.T_camera_world * place->T_camera_world.inverse();
-    essential = EssentialGraph::of(map_, settings_.closer.min_shared, closing);
   }
+  EssentialGraph essential = EssentialGraph::of(map_, map_mutex_, settings_.closer.min_shared, closing);
   const PoseGraph before = essential.graph;
   detector_.reset();
   if (!adjust_pose_graph(essential.graph, settings_.pose_graph, should_stop).is_usable) return false;

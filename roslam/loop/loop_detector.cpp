@@ -51,15 +51,28 @@ LoopDetector::LoopDetector(const LoopDetectorOptions& options, PlaceCheck check)
   options_.validate();
 }
 
-std::optional<Loop> LoopDetector::detect(const Map& map, const PlaceIndex& places, KeyframeId keyframe) {
-  const Keyframe* current = map.find(keyframe);
-  if (current == nullptr) return std::nullopt;
+std::optional<Loop> LoopDetector::detect(const Map& map, const PlaceIndex& places, std::mutex& map_mutex,
+                                         KeyframeId keyframe) {
+  std::shared_ptr<const ObservedFrame> view;
+  std::vector<Place> candidates;
+  {
+    const std::scoped_lock lock(map_mutex);
+    const Keyframe* current = map.find(keyframe);
+    if (current == nullptr) return std::nullopt;
+    view = current->view;
+    for (const KeyframeId id : this->candidates(map, places, keyframe))
+      candidates.push_back(*Place::of(map, id));
+  }
   std::erase_if(suspicions_, [&](const Suspicion& suspicion) {
     return keyframe.value - suspicion.newest.value > static_cast<std::uint32_t>(options_.patience);
   });
-  for (const KeyframeId place : candidates(map, places, keyframe)) {
-    const auto match = check_.match(map, place, *current->view, options_.min_inliers);
-    if (!match || !is_plausible(map, keyframe, *match)) continue;
+  for (const Place& place : candidates) {
+    auto match = check_.recognise(place, *view);
+    if (!match) continue;
+    const std::scoped_lock lock(map_mutex);
+    if (map.find(keyframe) == nullptr) return std::nullopt;
+    if (!check_.confirm(map, *view, *match, options_.min_inliers)) continue;
+    if (!is_plausible(map, keyframe, *match)) continue;
     if (support(map, keyframe, *match) >= options_.consistent) return Loop{keyframe, *match};
     break;
   }

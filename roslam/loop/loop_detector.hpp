@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <vector>
@@ -41,8 +42,10 @@ class LoopDetector {
  public:
   LoopDetector(const LoopDetectorOptions& options, PlaceCheck check);
 
-  /// The keyframe must be in the index. Nothing most of the time.
-  std::optional<Loop> detect(const Map& map, const PlaceIndex& places, KeyframeId keyframe);
+  /// The keyframe must be in the index. Nothing most of the time. Takes the mutex, which guards map and
+  /// places, for a few milliseconds at a time.
+  std::optional<Loop> detect(const Map& map, const PlaceIndex& places, std::mutex& map_mutex,
+                             KeyframeId keyframe);
 
   /// Forgets what keyframes recognised so far, as after a correction of the map.
   void reset() { suspicions_.clear(); }

@@ -8,21 +8,26 @@ namespace roslam {
 void MapCorrection::apply_to(Map& map) const {
   if (T_old_new.empty()) return;
   std::vector<SE3> T_new_old(map.keyframe_slots());
+  std::vector<SE3> T_camera_new(map.keyframe_slots());
   for (const KeyframeId id : map.keyframe_ids()) {
-    T_new_old[id.index()] = motion_for(map, *map.find(id)).inverse();
+    const Keyframe& keyframe = *map.find(id);
+    const SE3 motion = motion_for(map, keyframe);
+    T_new_old[id.index()] = motion.inverse();
+    T_camera_new[id.index()] = keyframe.T_camera_world * motion;
   }
-  for (const LandmarkId id : map.landmark_ids()) {
-    Landmark& landmark = *map.find(id);
+  auto known = positions.begin();
+  for (std::uint32_t i = 0; i < map.landmark_slots(); ++i) {
+    const LandmarkId id{i};
+    Landmark* landmark = map.find(id);
+    while (known != positions.end() && known->first < id) ++known;
+    if (landmark == nullptr) continue;
     // The first to see it knows it best: what came later may lie on the other side of the loop.
-    const SE3& motion = T_new_old[landmark.observations.front().keyframe.index()];
-    const auto known = positions.find(id);
-    landmark.position = known != positions.end() ? known->second : motion * landmark.position;
-    landmark.normal = motion.rotation() * landmark.normal;
+    const SE3& motion = T_new_old[landmark->observations.front().keyframe.index()];
+    const bool is_known = known != positions.end() && known->first == id;
+    landmark->position = is_known ? known->second : motion * landmark->position;
+    landmark->normal = motion.rotation() * landmark->normal;
   }
-  for (const KeyframeId id : map.keyframe_ids()) {
-    Keyframe& keyframe = *map.find(id);
-    keyframe.T_camera_world = keyframe.T_camera_world * T_new_old[id.index()].inverse();
-  }
+  for (const KeyframeId id : map.keyframe_ids()) map.find(id)->T_camera_world = T_camera_new[id.index()];
   map.note_correction();
 }
 

@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <utility>
+#include <vector>
 
 #include "roslam/map/map.hpp"
 
@@ -14,9 +16,9 @@ struct MapCorrection {
   /// By keyframe of the snapshot: maps the corrected world to the world as that keyframe had it.
   std::map<KeyframeId, SE3> T_old_new;
 
-  /// Of landmarks of the snapshot whose new position is known; all others move along with a keyframe that
-  /// sees them.
-  std::map<LandmarkId, Eigen::Vector3d> positions;
+  /// Of landmarks of the snapshot whose new position is known, by ascending id; all others move along with a
+  /// keyframe that sees them.
+  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> positions;
 
   /// Corrects a map of which the snapshot was taken: keyframes that came since move along with the one of
   /// their world that shares most with them, keyframes that moved since keep that motion.

@@ -123,8 +123,8 @@ SE3 Flight::T_world_camera(double time) const {
   }
   const Vector2d along = direction(waypoint.heading);
   const Vector2d left(-along.y(), along.x());
-  const Vector2d position =
-      waypoint.position + drift * channel(0, 0.05) * along + (drift + 0.02) * channel(1, 0.07) * left;
+  const Vector2d position = waypoint.position + drift * channel(0, 0.05) * along +
+                            ((drift + 0.02) * channel(1, 0.07) + options_.aside) * left;
   const double height = options_.altitude + 0.04 * channel(2, 0.09);
   const double degree = kPi / 180.0;
   const double yaw = waypoint.heading + 1.0 * degree * channel(3, 0.11);

@@ -42,6 +42,8 @@ void SimulatorOptions::validate() const {
   check("fps", fps, 1, 1000);
   check("speed", speed, 0.01, 30);
   check("altitude", altitude, 2.2, 30);  // above the heads and the cars
+  check("aside", aside, -3, 3);          // between the houses
+  check("gain", gain, 0.1, 10);
   check("pitch_down", pitch_down, -0.8, 1.58);
   check("sway", sway, 0, 5);
   check("colour_noise", colour_noise, 0, 50);

@@ -35,8 +35,10 @@ struct SimulatorOptions {
   double fps = 30.0;          ///< frames a second
   double speed = 1.0;         ///< of the flight, metres a second
   double altitude = 3.5;      ///< of the camera above the street, metres
+  double aside = 0.0;         ///< of the path, metres to the left of the usual one
   double pitch_down = 0.26;   ///< of the camera below the horizon, radians
   double sway = 1.0;          ///< of the drone in the air; 1 is a few centimetres and about a degree, 0 none
+  double gain = 1.0;          ///< of the pictures' brightness, as under other light
   double colour_noise = 1.5;  ///< standard deviation, grey levels
 
   /// Throws OptionsError naming the field that is out of its range.

@@ -26,10 +26,11 @@ Camera camera_for(const SimulatorOptions& options) {
 
 // Rounds to bytes, with the noise of an image sensor: the sum of two even chances for each channel, of which
 // one mixing of bits serves all three.
-cv::Mat expose(const cv::Mat& colour, double noise, std::uint32_t seed) {
+cv::Mat expose(const cv::Mat& colour, double gain, double noise, std::uint32_t seed) {
   constexpr double kSpread = 13.06;  // standard deviation of the sum of two numbers of five bits
   cv::Mat image(colour.size(), CV_8UC3);
   const auto strength = static_cast<float>(noise / kSpread);
+  const auto brightness = static_cast<float>(gain);
   for (int y = 0; y < image.rows; ++y) {
     const auto row_seed = mix(seed, static_cast<std::uint32_t>(y));
     const auto* from = colour.ptr<float>(y);
@@ -39,7 +40,7 @@ cv::Mat expose(const cv::Mat& colour, double noise, std::uint32_t seed) {
       for (int channel = 0; channel < 3; ++channel, bits >>= 10) {
         const auto sum = static_cast<int>((bits & 31U) + (bits >> 5 & 31U));
         const float error = strength * static_cast<float>(sum - 31);
-        *to++ = static_cast<std::uint8_t>(std::clamp(*from++ + error + 0.5F, 0.0F, 255.0F));
+        *to++ = static_cast<std::uint8_t>(std::clamp(brightness * *from++ + error + 0.5F, 0.0F, 255.0F));
       }
     }
   }
@@ -104,13 +105,14 @@ SimulatedView Simulator::render(std::size_t index, SimulatedParts parts) {
   impl_->renderer.set_movables(std::move(movables));
   const simulation::Picture picture = impl_->renderer.draw(pose);
   const auto noise_seed = mix(impl_->options.seed, static_cast<std::uint32_t>(index), 0xca3e7aU);
-  view.frame.colour = expose(picture.colour, impl_->options.colour_noise, noise_seed);
+  view.frame.colour = expose(picture.colour, impl_->options.gain, impl_->options.colour_noise, noise_seed);
   view.frame.depth = impl_->measured(picture.depth, index);
   view.frame.labels = picture.labels;
   view.instances = picture.instances;
   if (parts == SimulatedParts::kBackground) {
     const simulation::Picture background = impl_->renderer.without_movables(pose, picture);
-    view.background_colour = expose(background.colour, impl_->options.colour_noise, noise_seed);
+    view.background_colour =
+        expose(background.colour, impl_->options.gain, impl_->options.colour_noise, noise_seed);
     view.background_depth = impl_->measured(background.depth, index);
   }
   return view;

@@ -36,41 +36,54 @@ PlaceCheck::PlaceCheck(const Camera& camera, const Settings& settings)
   settings.check.validate();
 }
 
-std::optional<PlaceMatch> PlaceCheck::match(const Map& map, KeyframeId place, const ObservedFrame& view,
-                                            int min_inliers) {
-  const Keyframe* keyframe = map.find(place);
+std::optional<Place> Place::of(const Map& map, KeyframeId id) {
+  const Keyframe* keyframe = map.find(id);
   if (keyframe == nullptr) return std::nullopt;
-  auto found = first_pose(map, *keyframe, view);
-  if (!found) return std::nullopt;
-  PlaceMatch& match = *found;
+  Place place{id, keyframe->view, {}, {}, {}};
+  for (std::uint32_t i = 0; i < keyframe->landmarks.size(); ++i) {
+    const LandmarkId landmark = keyframe->landmarks[i];
+    if (!landmark.is_valid()) continue;
+    place.points.push_back(i);
+    place.landmarks.push_back(landmark);
+    place.positions.push_back(map.find(landmark)->position);
+  }
+  return place;
+}
+
+std::optional<PlaceMatch> PlaceCheck::match(const Map& map, KeyframeId keyframe, const ObservedFrame& view,
+                                            int min_inliers) {
+  const auto place = Place::of(map, keyframe);
+  if (!place) return std::nullopt;
+  auto found = recognise(*place, view);
+  if (!found || !confirm(map, view, *found, min_inliers)) return std::nullopt;
+  return found;
+}
+
+bool PlaceCheck::confirm(const Map& map, const ObservedFrame& view, PlaceMatch& match, int min_inliers) {
+  if (map.find(match.place) == nullptr) return false;
   fit(map, view, match);
-  const auto landmarks = landmarks_around(map, place);
+  const auto landmarks = landmarks_around(map, match.place);
   // Wide first, as a pose from few matches may be off; then once more from where the landmarks put it.
   for (const double radius : {settings_.check.search_radius, settings_.matcher.map_radius}) {
     search(map, landmarks, view, radius, match);
     fit(map, view, match);
   }
-  if (match.inliers < min_inliers) return std::nullopt;
-  return found;
+  return match.inliers >= min_inliers;
 }
 
-// The pose that matches with the landmarks of the keyframe agree on: P3P in RANSAC.
-std::optional<PlaceMatch> PlaceCheck::first_pose(const Map& map, const Keyframe& keyframe,
-                                                 const ObservedFrame& view) const {
+std::optional<PlaceMatch> PlaceCheck::recognise(const Place& place, const ObservedFrame& view) const {
   const PlaceCheckOptions& options = settings_.check;
-  std::vector<std::uint32_t> known;
-  for (std::uint32_t i = 0; i < keyframe.landmarks.size(); ++i) {
-    if (keyframe.landmarks[i].is_valid()) known.push_back(i);
-  }
   MatcherOptions matching = settings_.matcher;
   matching.strict_distance = options.match_distance;
   matching.ratio = options.match_ratio;
-  const auto matches = match_descriptors(*keyframe.view, known, view, matching);
+  const auto matches = match_descriptors(*place.view, place.points, view, matching);
   if (static_cast<int>(matches.size()) < options.min_matches) return std::nullopt;
+  std::vector<std::size_t> known(place.view->size());  // of each point of the place, where it is listed
+  for (std::size_t k = 0; k < place.points.size(); ++k) known[place.points[k]] = k;
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> pixels;
-  for (const auto& [in_keyframe, in_view] : matches) {
-    const Eigen::Vector3d& p = map.find(keyframe.landmarks[in_keyframe])->position;
+  for (const auto& [in_place, in_view] : matches) {
+    const Eigen::Vector3d& p = place.positions[known[in_place]];
     points.emplace_back(p.x(), p.y(), p.z());
     pixels.emplace_back(view.pixels[in_view].x(), view.pixels[in_view].y());
   }
@@ -88,12 +101,12 @@ std::optional<PlaceMatch> PlaceCheck::first_pose(const Map& map, const Keyframe&
     return std::nullopt;
   }
   if (!is_found || static_cast<int>(agreeing.size()) < options.min_agreeing) return std::nullopt;
-  PlaceMatch result{keyframe.id, from_rodrigues(rotation, translation), std::vector<LandmarkId>(view.size()),
-                    static_cast<int>(agreeing.size())};
+  PlaceMatch result{place.keyframe, from_rodrigues(rotation, translation),
+                    std::vector<LandmarkId>(view.size()), static_cast<int>(agreeing.size())};
   if (!result.T_camera_world.is_finite()) return std::nullopt;
   for (const int i : agreeing) {
-    const auto& [in_keyframe, in_view] = matches[static_cast<std::size_t>(i)];
-    result.landmarks[in_view] = keyframe.landmarks[in_keyframe];
+    const auto& [in_place, in_view] = matches[static_cast<std::size_t>(i)];
+    result.landmarks[in_view] = place.landmarks[known[in_place]];
   }
   return result;
 }
@@ -142,9 +155,13 @@ void PlaceCheck::fit(const Map& map, const ObservedFrame& view, PlaceMatch& matc
   std::vector<PoseMeasurement> measurements;
   std::vector<std::uint32_t> points;
   for (std::uint32_t i = 0; i < match.landmarks.size(); ++i) {
-    if (!match.landmarks[i].is_valid()) continue;
-    measurements.push_back(
-        {map.find(match.landmarks[i])->position, map.measurement(view, i, settings_.noise)});
+    match.landmarks[i] = map.resolve(match.landmarks[i]);
+    const Landmark* landmark = map.find(match.landmarks[i]);
+    if (landmark == nullptr) {  // gone since it was recognised
+      match.landmarks[i] = {};
+      continue;
+    }
+    measurements.push_back({landmark->position, map.measurement(view, i, settings_.noise)});
     points.push_back(i);
   }
   const OptimisedPose pose = optimise_pose(camera_, measurements, match.T_camera_world, settings_.pose);

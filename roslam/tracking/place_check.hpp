@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -11,6 +13,18 @@
 #include "roslam/tracking/projection_matcher.hpp"
 
 namespace roslam {
+
+/// What a keyframe knows of the map, copied, so that views can be compared with it while the map goes on.
+struct Place {
+  KeyframeId keyframe;
+  std::shared_ptr<const ObservedFrame> view;
+  std::vector<std::uint32_t> points;       ///< of the view, that show landmarks
+  std::vector<LandmarkId> landmarks;       ///< of each of these
+  std::vector<Eigen::Vector3d> positions;  ///< of each of these, world, metres
+
+  /// Nothing if there is no such keyframe, or no longer.
+  static std::optional<Place> of(const Map& map, KeyframeId keyframe);
+};
 
 /// What a view turned out to show of a place in the map.
 struct PlaceMatch {
@@ -48,14 +62,19 @@ class PlaceCheck {
 
   PlaceCheck(const Camera& camera, const Settings& settings);
 
-  /// Nothing if the view does not show what the keyframe and its neighbours see: too few matches, too few
-  /// that agree on a pose (P3P), or fewer than min_inliers landmarks found where that pose puts them.
+  /// A first pose from matches with what the keyframe sees: P3P in RANSAC. Nothing if there are too few
+  /// matches, or too few that agree. The slow part, which needs no map.
+  std::optional<PlaceMatch> recognise(const Place& place, const ObservedFrame& view) const;
+
+  /// Looks for the landmarks of the keyframe and its neighbours where that pose puts them, and improves it.
+  /// False if fewer than min_inliers are found.
+  bool confirm(const Map& map, const ObservedFrame& view, PlaceMatch& match, int min_inliers);
+
+  /// Both. Nothing if the view does not show what the keyframe and its neighbours see.
   std::optional<PlaceMatch> match(const Map& map, KeyframeId place, const ObservedFrame& view,
                                   int min_inliers);
 
  private:
-  std::optional<PlaceMatch> first_pose(const Map& map, const Keyframe& keyframe,
-                                       const ObservedFrame& view) const;
   std::vector<LandmarkId> landmarks_around(const Map& map, KeyframeId place) const;
   void search(const Map& map, const std::vector<LandmarkId>& landmarks, const ObservedFrame& view,
               double radius, PlaceMatch& match);
