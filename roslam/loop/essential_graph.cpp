@@ -2,10 +2,24 @@
 #include "roslam/loop/essential_graph.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
+#include <span>
 
 namespace roslam {
+
+namespace {
+// The edges from a node to older ones all rest on the same landmarks, so that together they count as one, and
+// drift adds up from keyframe to keyframe. Else many edges would make the graph too stiff for any loop.
+void weigh(std::span<PoseGraph::Edge> edges) {
+  constexpr std::size_t kFar = 20;  // keyframes; what lies farther back is tied by a loop as well
+  for (auto& edge : edges) {
+    const std::size_t between = std::min(edge.to - edge.from, kFar);
+    edge.weight = 1.0 / std::sqrt(static_cast<double>(edges.size() * between));
+  }
+}
+}  // namespace
 
 EssentialGraph EssentialGraph::of(const Map& map, std::mutex& map_mutex, int min_shared,
                                   const LoopClosure& closing) {
@@ -37,6 +51,7 @@ EssentialGraph EssentialGraph::of(const Map& map, std::mutex& map_mutex, int min
   for (std::size_t begin = 0; begin < nodes.size(); begin += kAtOnce) {
     const std::scoped_lock lock(map_mutex);
     for (std::size_t node = begin; node < std::min(begin + kAtOnce, nodes.size()); ++node) {
+      const std::size_t first_edge = edges.size();
       bool has_parent = false;
       for (const auto& [neighbour, shared] : map.covisible(result.keyframes[node])) {  // most first
         const std::size_t other = neighbour.index() < node_of.size() ? node_of[neighbour.index()] : kNone;
@@ -47,6 +62,7 @@ EssentialGraph EssentialGraph::of(const Map& map, std::mutex& map_mutex, int min
       const auto before = newest.find(worlds[node]);
       if (!has_parent && before != newest.end()) tie(before->second, node);
       newest[worlds[node]] = node;
+      weigh(std::span(edges).subspan(first_edge));
     }
   }
   for (const auto& [from, to, T_to_from] : loops)

@@ -128,8 +128,11 @@ std::string Vocabulary::content() const {
 void Vocabulary::save(const std::filesystem::path& file) const { write_binary(file, kFormat, content()); }
 
 Vocabulary Vocabulary::load(const std::filesystem::path& file) {
-  const std::string bytes = read_binary(file, kFormat);
-  BinaryReader reader(bytes, file.string());
+  return decode(read_binary(file, kFormat), file.string());
+}
+
+Vocabulary Vocabulary::decode(std::string_view content, const std::string& name) {
+  BinaryReader reader(content, name);
   Vocabulary result;
   result.nodes_.resize(reader.get_count(kNodeBytes));
   std::uint32_t next = 1;
@@ -149,7 +152,7 @@ Vocabulary Vocabulary::load(const std::filesystem::path& file) {
     result.weights_.push_back(weight);
   }
   if (next != result.nodes_.size() || reader.left() > 0) reader.fail("its tree has loose ends");
-  result.fingerprint_ = fnv(bytes);
+  result.fingerprint_ = fnv(content);
   return result;
 }
 

@@ -47,6 +47,10 @@ class Vocabulary {
   /// Throws InputError naming the file and what is wrong with it.
   static Vocabulary load(const std::filesystem::path& file);
 
+  /// The content of such a file, behind its header, and back; name: of the file, for messages.
+  std::string content() const;
+  static Vocabulary decode(std::string_view content, const std::string& name);
+
   /// Replaces the file whole or not at all. Throws OutputError.
   void save(const std::filesystem::path& file) const;
 
@@ -75,7 +79,6 @@ class Vocabulary {
 
   void number_words();
   void weigh(std::span<const std::vector<Descriptor>> pictures);
-  std::string content() const;
 
   std::vector<Node> nodes_;     // the root first, parents before children
   std::vector<float> weights_;  // by word

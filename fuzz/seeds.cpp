@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// fuzz_seeds DIR: writes a small good file for each parser to DIR/PARSER/seed.
+#include <cstdio>
+#include <random>
+
+#include "roslam/atlas/map_file.hpp"
+#include "roslam/error.hpp"
+#include "roslam/geometry/camera.hpp"
+#include "roslam/pipeline/options.hpp"
+#include "roslam/write_file.hpp"
+
+namespace {
+using namespace roslam;
+
+std::vector<Descriptor> random_descriptors(std::size_t count) {
+  std::mt19937_64 random(1);
+  std::vector<Descriptor> result(count);
+  for (auto& descriptor : result) descriptor = {random(), random(), random(), random()};
+  return result;
+}
+
+// Two keyframes that see the same four points.
+SavedMap small_map() {
+  const Camera camera;
+  Map map({1.0F, 1.2F});
+  for (int k = 0; k < 2; ++k) {
+    auto view = std::make_shared<ObservedFrame>();
+    view->descriptors = random_descriptors(4);
+    for (int i = 0; i < 4; ++i) {
+      view->pixels.emplace_back(100.0F + 50.0F * static_cast<float>(i), 200.0F);
+      view->depths.push_back(2.0F);
+      view->levels.push_back(static_cast<std::uint8_t>(i % 2));
+      view->angles.push_back(10.0F);
+      view->colours.emplace_back(1, 2, 3);
+    }
+    view->grid = FeatureGrid(view->pixels, camera.undistorted_bounds());
+    map.add_keyframe(static_cast<std::size_t>(k), 0.1 * k, SE3(), view);
+  }
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    const LandmarkId id = map.add_landmark({0.1 * i, 0.0, 2.0}, KeyframeId{0}, i);
+    map.add_observation(id, KeyframeId{1}, i);
+  }
+  map.add_loop(KeyframeId{0}, KeyframeId{1}, SE3());
+  SavedMap saved = SavedMap::of(camera, map, nullptr);
+  saved.vocabulary = 1;
+  saved.words = {{{1, 0.5F}, {7, 0.5F}}, {}};
+  return saved;
+}
+}  // namespace
+
+int main(int count, char** arguments) {
+  if (count != 2) {
+    std::fprintf(stderr, "usage: fuzz_seeds DIR\n");
+    return 2;
+  }
+  const std::filesystem::path folder = arguments[1];
+  const auto put = [&](const char* parser, std::string_view bytes) {
+    make_folder(folder / parser);
+    write_file(folder / parser / "seed", bytes);
+  };
+  try {
+    put("camera", camera_to_yaml(*camera_preset("tum-fr1")));
+    put("options", options_to_yaml({}));
+    put("trajectory", "# time x y z\n1.5 0 0 1 0 0 0 1\n2.5 0 1 1 0 0 0.6 0.8\n");
+    put("tum_list", "# time file\n1.5 rgb/1.5.png\n2.5 rgb/2.5.png\n");
+    put("vocabulary",
+        Vocabulary::train(std::vector{random_descriptors(60)}, {.branching = 3, .depth = 3}).content());
+    put("map", encode_map(small_map()));
+  } catch (const Error& error) {
+    std::fprintf(stderr, "error: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
