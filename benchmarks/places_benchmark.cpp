@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <mutex>
 #include <opencv2/imgproc.hpp>
 #include <thread>
 
@@ -12,6 +11,7 @@
 #include "roslam/atlas/map_file.hpp"
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/loop/loop_closer.hpp"
+#include "roslam/map/map_mutex.hpp"
 #include "roslam/pipeline/options.hpp"
 #include "tests/loop_scene.hpp"
 
@@ -60,7 +60,7 @@ void query(benchmark::State& state, RenderedFlight& flight) {
 // A flight around and a little further; the places of the once around are known.
 struct Around {
   Around() {
-    flight.build_ring();
+    flight.build_ring(18000);  // 800 points a view
     for (int i = 0; i < kAround + kFurther; ++i) {
       const KeyframeId id = flight.fly_to(scene::WallFlight::on_ring(kStep * i), 0.0005, map);
       if (i < kAround) places.add(id, places.describe(*map.find(id)->view));
@@ -79,7 +79,7 @@ void close_loop(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
     Around around;
-    std::mutex mutex;
+    MapMutex mutex;
     LoopCloser closer(around.flight.camera(), around.map, around.places, mutex, Options{}.loop_settings());
     std::atomic<double> longest = 0.0;
     std::jthread tracker([&](const std::stop_token& stop) {

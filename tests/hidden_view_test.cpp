@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <mutex>
 #include <opencv2/imgproc.hpp>
 
+#include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/local_mapper.hpp"
 #include "roslam/pipeline/removal_log.hpp"
 #include "roslam/pipeline/run.hpp"
@@ -190,7 +190,7 @@ class HiddenTracker : public Street {
   const Camera camera_ = *camera_preset("simulated");
   const OrbExtractor extractor_;
   Map map_{scales(extractor_)};
-  std::mutex mutex_;
+  MapMutex mutex_;
   LocalMapper mapper_{camera_, map_, mutex_, Options().mapper_settings()};
   Tracker tracker_{camera_, map_, settings()};
 };

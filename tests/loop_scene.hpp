@@ -35,8 +35,8 @@ class WallFlight {
   double normal() { return std::normal_distribution<double>()(random_); }
 
   /// A round wall 4 m outside of a round path.
-  void build_ring() {
-    for (int i = 0; i < 6000; ++i) {
+  void build_ring(int points = 6000) {
+    for (int i = 0; i < points; ++i) {
       const double angle = uniform(0.0, 2.0 * M_PI);
       const double radius = kRadius + 4.0 + uniform(-0.5, 0.5);
       points_.push_back(

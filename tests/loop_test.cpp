@@ -32,7 +32,7 @@ class LoopTest : public testing::Test {
 
   WallFlight flight_{7};
   Map map_{{1.0F, 1.2F, 1.44F, 1.728F}};
-  std::mutex mutex_;
+  MapMutex mutex_;
   std::optional<PlaceIndex> places_;
   std::optional<LoopCloser> closer_;
 };
@@ -167,7 +167,7 @@ TEST_F(LoopTest, RepeatsBitByBit) {
     WallFlight flight(3);
     flight.build_ring();
     Map map({1.0F, 1.2F, 1.44F, 1.728F});
-    std::mutex mutex;
+    MapMutex mutex;
     std::vector<std::vector<Descriptor>> pictures;
     for (int i = 0; i < 60; ++i) pictures.push_back(flight.view(WallFlight::on_ring(0.11 * i))->descriptors);
     PlaceIndex places(

@@ -2,9 +2,9 @@
 #include "roslam/atlas/merge_maps.hpp"
 
 #include <algorithm>
-#include <mutex>
 
 #include "roslam/error.hpp"
+#include "roslam/map/map_mutex.hpp"
 
 namespace roslam {
 
@@ -21,7 +21,7 @@ SavedMap merge_maps(const SavedMap& first, const SavedMap& second,
 
   // Once for all loops is enough.
   const int bundle_iterations = std::exchange(settings.closer.bundle_iterations, 0);
-  std::mutex nobody_else;
+  MapMutex nobody_else;
   LoopCloser closer(first.camera, map, places, nobody_else, settings);
   for (std::uint32_t i = begin; i < map.keyframe_slots(); ++i) {
     closer.process(KeyframeId{i});

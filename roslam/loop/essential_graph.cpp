@@ -21,9 +21,9 @@ void weigh(std::span<PoseGraph::Edge> edges) {
 }
 }  // namespace
 
-EssentialGraph EssentialGraph::of(const Map& map, std::mutex& map_mutex, int min_shared,
+EssentialGraph EssentialGraph::of(const Map& map, MapMutex& map_mutex, int min_shared,
                                   const LoopClosure& closing) {
-  constexpr std::size_t kAtOnce = 20;  // keyframes read under one lock
+  constexpr std::size_t kAtOnce = 10;  // keyframes read under one lock
   constexpr std::size_t kNone = ~std::size_t{0};
   EssentialGraph result;
   std::vector<std::size_t> node_of;

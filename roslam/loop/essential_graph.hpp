@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <mutex>
 #include <vector>
 
 #include "roslam/loop/map_correction.hpp"
 #include "roslam/loop/pose_graph.hpp"
 #include "roslam/map/map.hpp"
+#include "roslam/map/map_mutex.hpp"
 
 namespace roslam {
 
@@ -19,7 +19,7 @@ struct EssentialGraph {
   /// The first keyframe of each world is fixed. min_shared: landmarks that make a pair. closing: a loop
   /// between living keyframes that is not in the map yet; the last edge. Takes the mutex for a few
   /// milliseconds at a time.
-  static EssentialGraph of(const Map& map, std::mutex& map_mutex, int min_shared, const LoopClosure& closing);
+  static EssentialGraph of(const Map& map, MapMutex& map_mutex, int min_shared, const LoopClosure& closing);
 
   /// What has to happen to the map for its keyframes to lie as in the graph; before: the graph as it was
   /// taken.

@@ -6,10 +6,10 @@
 namespace roslam {
 
 namespace {
-constexpr std::size_t kAtOnce = 2000;  // landmarks read under one lock
+constexpr std::size_t kAtOnce = 500;  // landmarks read under one lock
 }
 
-GlobalBundle GlobalBundle::of(const Map& map, std::mutex& map_mutex, const MeasurementNoise& noise) {
+GlobalBundle GlobalBundle::of(const Map& map, MapMutex& map_mutex, const MeasurementNoise& noise) {
   GlobalBundle result;
   std::vector<std::size_t> pose_of;
   std::vector<LandmarkId> candidates;
@@ -26,7 +26,11 @@ GlobalBundle GlobalBundle::of(const Map& map, std::mutex& map_mutex, const Measu
   }
   std::vector<bool> is_in(pose_of.size(), false);
   for (const KeyframeId id : result.keyframes) is_in[id.index()] = true;
+  std::vector<BundleProblem::Term>
+      terms;  // of one part; joined with the others, which takes memory, without the lock
   for (std::size_t begin = 0; begin < candidates.size(); begin += kAtOnce) {
+    result.problem.terms.insert(result.problem.terms.end(), terms.begin(), terms.end());
+    terms.clear();
     const std::scoped_lock lock(map_mutex);
     for (std::size_t i = begin; i < std::min(begin + kAtOnce, candidates.size()); ++i) {
       const Landmark* landmark = map.find(candidates[i]);
@@ -36,13 +40,14 @@ GlobalBundle GlobalBundle::of(const Map& map, std::mutex& map_mutex, const Measu
         const std::size_t k = observation.keyframe.index();
         if (k >= is_in.size() || !is_in[k]) continue;  // came since
         const ObservedFrame& view = *map.find(observation.keyframe)->view;
-        result.problem.terms.push_back(
+        terms.push_back(
             {pose_of[k], result.landmarks.size(), map.measurement(view, observation.point, noise)});
       }
       result.problem.points.push_back(landmark->position);
       result.landmarks.push_back(candidates[i]);
     }
   }
+  result.problem.terms.insert(result.problem.terms.end(), terms.begin(), terms.end());
   return result;
 }
 

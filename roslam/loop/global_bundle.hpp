@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <mutex>
 #include <vector>
 
 #include "roslam/loop/map_correction.hpp"
 #include "roslam/map/map.hpp"
+#include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/bundle_adjustment.hpp"
 
 namespace roslam {
@@ -18,7 +18,7 @@ struct GlobalBundle {
 
   /// The first keyframe of each world is fixed. Takes the mutex for a few milliseconds at a time, so that the
   /// tracker never has to wait for the whole.
-  static GlobalBundle of(const Map& map, std::mutex& map_mutex, const MeasurementNoise& noise);
+  static GlobalBundle of(const Map& map, MapMutex& map_mutex, const MeasurementNoise& noise);
 
   /// What has to happen to the map for it to be as in the problem; before: the problem as it was taken.
   MapCorrection correction(const BundleProblem& before) const;

@@ -15,7 +15,7 @@ void LoopCloserOptions::validate() const {
     throw OptionsError("loop_closer.bundle_iterations must be 0 to 1000");
 }
 
-LoopCloser::LoopCloser(const Camera& camera, Map& map, PlaceIndex& places, std::mutex& map_mutex,
+LoopCloser::LoopCloser(const Camera& camera, Map& map, PlaceIndex& places, MapMutex& map_mutex,
                        const Settings& settings)
     : camera_(camera),
       map_(map),

@@ -3,7 +3,6 @@
 
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include "roslam/loop/loop_detector.hpp"
 #include "roslam/loop/pose_graph.hpp"
 #include "roslam/map/map.hpp"
+#include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/fusion.hpp"
 #include "roslam/places/place_index.hpp"
 
@@ -52,7 +52,7 @@ class LoopCloser {
   };
 
   /// map_mutex guards map and places against the tracker and the mapper.
-  LoopCloser(const Camera& camera, Map& map, PlaceIndex& places, std::mutex& map_mutex,
+  LoopCloser(const Camera& camera, Map& map, PlaceIndex& places, MapMutex& map_mutex,
              const Settings& settings);
 
   /// Puts a keyframe into the index and closes the loop it may show. Slow where it does; takes the mutex for
@@ -84,7 +84,7 @@ class LoopCloser {
   Camera camera_;
   Map& map_;
   PlaceIndex& places_;
-  std::mutex& map_mutex_;
+  MapMutex& map_mutex_;
   Settings settings_;
   LoopDetector detector_;
   std::vector<ClosedLoop> closed_;

@@ -51,7 +51,7 @@ LoopDetector::LoopDetector(const LoopDetectorOptions& options, PlaceCheck check)
   options_.validate();
 }
 
-std::optional<Loop> LoopDetector::detect(const Map& map, const PlaceIndex& places, std::mutex& map_mutex,
+std::optional<Loop> LoopDetector::detect(const Map& map, const PlaceIndex& places, MapMutex& map_mutex,
                                          KeyframeId keyframe) {
   std::shared_ptr<const ObservedFrame> view;
   std::vector<Place> candidates;

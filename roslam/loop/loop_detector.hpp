@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cstddef>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <vector>
 
 #include "roslam/map/map.hpp"
+#include "roslam/map/map_mutex.hpp"
 #include "roslam/places/place_index.hpp"
 #include "roslam/tracking/place_check.hpp"
 
@@ -44,7 +44,7 @@ class LoopDetector {
 
   /// The keyframe must be in the index. Nothing most of the time. Takes the mutex, which guards map and
   /// places, for a few milliseconds at a time.
-  std::optional<Loop> detect(const Map& map, const PlaceIndex& places, std::mutex& map_mutex,
+  std::optional<Loop> detect(const Map& map, const PlaceIndex& places, MapMutex& map_mutex,
                              KeyframeId keyframe);
 
   /// Forgets what keyframes recognised so far, as after a correction of the map.

@@ -5,7 +5,7 @@
 
 namespace roslam {
 
-LocalMapper::LocalMapper(const Camera& camera, Map& map, std::mutex& map_mutex, const Settings& settings)
+LocalMapper::LocalMapper(const Camera& camera, Map& map, MapMutex& map_mutex, const Settings& settings)
     : camera_(camera),
       map_(map),
       map_mutex_(map_mutex),

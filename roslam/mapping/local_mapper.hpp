@@ -2,11 +2,11 @@
 #pragma once
 
 #include <functional>
-#include <mutex>
 
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/reprojection.hpp"
 #include "roslam/map/map.hpp"
+#include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/bundle_adjustment.hpp"
 #include "roslam/mapping/culling.hpp"
 #include "roslam/mapping/fusion.hpp"
@@ -28,7 +28,7 @@ class LocalMapper {
   };
 
   /// map_mutex guards the map against the tracker while process() runs on another thread.
-  LocalMapper(const Camera& camera, Map& map, std::mutex& map_mutex, const Settings& settings);
+  LocalMapper(const Camera& camera, Map& map, MapMutex& map_mutex, const Settings& settings);
 
   /// Makes a keyframe of a tracked frame, with landmarks for all points of known depth; of a new world if
   /// the frame has no reference. Quick; the caller holds the mutex.
@@ -53,7 +53,7 @@ class LocalMapper {
 
   Camera camera_;
   Map& map_;
-  std::mutex& map_mutex_;
+  MapMutex& map_mutex_;
   Settings settings_;
   LandmarkCuller landmark_culler_;
   Times times_;

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/loop/loop_closer.hpp"
 #include "roslam/map/map.hpp"
+#include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/local_mapper.hpp"
 #include "roslam/pipeline/keyframe_worker.hpp"
 #include "roslam/pipeline/options.hpp"
@@ -132,7 +132,7 @@ class Slam {
   SegmentationWorker segmentation_;
   DynamicRemoval removal_;
   OrbExtractor extractor_;
-  std::mutex map_mutex_;
+  MapMutex map_mutex_;
   Map map_;
   Tracker tracker_;
   KeyframePolicy keyframe_policy_;

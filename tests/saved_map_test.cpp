@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A map that was saved and loaded serves as the one that was never out of memory.
+#include <gtest/gtest.h>
+
+#include "roslam/atlas/map_file.hpp"
+#include "roslam/pipeline/slam.hpp"
+#include "roslam/removal/removal_options.hpp"
+#include "tests/street_frames.hpp"
+
+namespace roslam::street {
+namespace {
+
+class SavedMapTest : public Street {
+ protected:
+  static std::unique_ptr<Slam> slam_with(bool localises_only = false) {
+    Options options;
+    options.removal = *removal_from("none", options.removal);
+    options.keyframes.enabled = !localises_only;
+    return std::make_unique<Slam>(
+        *camera_preset("simulated"), options, Mode::kDeterministic, nullptr,
+        std::make_shared<const Vocabulary>(Vocabulary::load(ROSLAM_TEST_MODELS "/roslam-orb.vocabulary")));
+  }
+
+  static void feed(Slam& slam, std::size_t begin, std::size_t end) {
+    for (const Frame& frame : *frames_) {
+      if (frame.index < begin || frame.index >= end) continue;
+      ASSERT_TRUE(slam.process(frame));
+    }
+    slam.finish();
+  }
+
+  static void expect_same(const Slam& a, const Slam& b) {
+    const Trajectory in_a = a.trajectory();
+    const Trajectory in_b = b.trajectory();
+    ASSERT_EQ(in_a.size(), in_b.size());
+    for (std::size_t i = 0; i < in_a.size(); ++i)
+      EXPECT_EQ(in_a[i].T_world_camera.matrix(), in_b[i].T_world_camera.matrix()) << i;
+    EXPECT_TRUE(encode_map(a.snapshot()) == encode_map(b.snapshot()));
+  }
+
+  ~SavedMapTest() override { fs::remove_all(file_); }
+  const fs::path file_ = scratch_path(".roslam");
+};
+
+TEST_F(SavedMapTest, TrackingAndMappingGoOnBitByBitAsInTheMapThatWasNeverSaved) {
+  const auto first = slam_with();
+  feed(*first, 0, 30);
+  save_map(file_, first->snapshot());
+  for (const bool localises_only : {false, true}) {
+    const auto kept = slam_with(localises_only);
+    kept->continue_from(first->snapshot());
+    feed(*kept, 30, kEnd);
+    const auto loaded = slam_with(localises_only);
+    loaded->continue_from(load_map(file_));
+    feed(*loaded, 30, kEnd);
+    EXPECT_EQ(kept->trajectory().size(), kBeforeGap - 30 + kEnd - kGapEnd);
+    expect_same(*kept, *loaded);
+    if (!localises_only) continue;
+    EXPECT_EQ(kept->map().keyframe_count(), first->map().keyframe_count());
+  }
+}
+
+TEST_F(SavedMapTest, WithoutAMapThereIsNothingToLocaliseIn) {
+  const auto slam = slam_with(true);
+  EXPECT_THROW(slam->process(frames_->front()), OptionsError);
+}
+
+TEST_F(SavedMapTest, AMapOfAnotherCameraIsRefused) {
+  const auto first = slam_with();
+  feed(*first, 0, 5);
+  SavedMap saved = first->snapshot();
+  saved.camera.cx += 1.0;
+  EXPECT_THROW(slam_with()->continue_from(std::move(saved)), InputError);
+}
+
+}  // namespace
+}  // namespace roslam::street
