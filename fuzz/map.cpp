@@ -3,15 +3,24 @@
 
 #include "fuzz/fuzz.hpp"
 #include "roslam/atlas/map_file.hpp"
+#include "roslam/loop/essential_graph.hpp"
+#include "roslam/mapping/local_mapper.hpp"
+#include "roslam/tracking/place_check.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace roslam;
   return fuzz::expect_result_or_error(data, size, [](std::string_view bytes) {
     // Behind the checksum, which hardly any damaged file passes. What is read must be a map that can be used.
     const SavedMap saved = decode_map(bytes, "fuzz");
+    const std::string written = encode_map(saved);
+    if (encode_map(decode_map(written, "fuzz")) != written) std::abort();
     Map map = SavedMap::of(saved.camera, saved.map, nullptr).map;
     for (const LandmarkId id : map.landmark_ids()) map.refresh(id);
-    for (const KeyframeId id : map.keyframe_ids()) map.covisible(id);
-    if (encode_map(saved) != bytes && saved.map.keyframe_count() != map.keyframe_count()) std::abort();
+    MapMutex mutex;
+    for (const KeyframeId id : map.keyframe_ids()) {
+      Place::of(map, id);
+      LocalBundle::around(map, id, {}, {});
+      EssentialGraph::of(map, mutex, 1, {map.keyframe_ids().front(), id, SE3()});
+    }
   });
 }

@@ -57,6 +57,10 @@ void BinaryReader::fail(const std::string& why) const {
 }
 
 void write_binary(const std::filesystem::path& file, const BinaryFormat& format, std::string_view content) {
+  if (content.size() > format.max_bytes) {
+    throw OutputError(file.string() + ": would have " + megabytes(content.size()) + ", more than " +
+                      std::string(format.what) + " may have (" + megabytes(format.max_bytes) + ")");
+  }
   BinaryWriter whole;
   whole.put_bytes(format.magic);
   whole.put(format.version);

@@ -87,7 +87,7 @@ TEST_F(MapCommand, AnotherFlightFindsItselfInTheMapAndLeavesItAlone) {
   EXPECT_EQ(content(same / "map.roslam"), bytes);
 
   const fs::path further = fly("further", 20, 60, map_option);
-  EXPECT_EQ(content(first / "map.roslam"), content(same / "map.roslam"));
+  EXPECT_EQ(content(first / "map.roslam"), bytes);
   const auto grown = info(further / "map.roslam");
   EXPECT_EQ(grown["worlds"], 1);
   EXPECT_GT(grown["keyframes"], found["keyframes"]);

@@ -55,6 +55,8 @@ TEST_F(SavedMapTest, TrackingAndMappingGoOnBitByBitAsInTheMapThatWasNeverSaved) 
     feed(*loaded, 30, kEnd);
     EXPECT_EQ(kept->trajectory().size(), kBeforeGap - 30 + kEnd - kGapEnd);
     expect_same(*kept, *loaded);
+    for (const BagOfWords& words : kept->snapshot().words) EXPECT_FALSE(words.empty());
+    EXPECT_TRUE(kept->has_met_map());
     if (!localises_only) continue;
     EXPECT_EQ(kept->map().keyframe_count(), first->map().keyframe_count());
   }

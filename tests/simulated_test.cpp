@@ -267,6 +267,23 @@ TEST(DepthNoise, LosesWhatAStereoCameraLoses) {
   EXPECT_GT(measured.at<float>(200, 402), 0.0F);
 }
 
+TEST(Simulator, FliesBesideTheUsualPathAndUnderOtherLight) {
+  auto options = options_for(FlightPath::kStreet, TrafficLevel::kNone);
+  Simulator usual(options);
+  options.gain = 0.5;
+  const auto bright = usual.render(10);
+  const auto dark = Simulator(options).render(10);
+  EXPECT_NEAR(cv::mean(dark.frame.colour)[1], 0.5 * cv::mean(bright.frame.colour)[1], 1.0);
+  EXPECT_TRUE(same_bytes(dark.frame.depth, bright.frame.depth));
+  options.gain = 1.0;
+  options.aside = 0.5;
+  const Simulator beside(options);
+  const SE3 moved = usual.T_world_camera(10).inverse() * beside.T_world_camera(10);
+  EXPECT_NEAR(moved.translation().norm(), 0.5, 1e-6);
+  EXPECT_LT(moved.translation().x(), -0.45) << "left of the camera";
+  EXPECT_LT(moved.angle(), 1e-9);
+}
+
 TEST(SimulatorOptions, NamesTheFieldOutOfItsRange) {
   SimulatorOptions options;
   options.speed = -1;
@@ -276,6 +293,12 @@ TEST(SimulatorOptions, NamesTheFieldOutOfItsRange) {
   } catch (const OptionsError& error) {
     EXPECT_NE(std::string(error.what()).find("speed"), std::string::npos);
   }
+  options = {};
+  options.gain = 0.0;
+  EXPECT_THROW(options.validate(), OptionsError);
+  options = {};
+  options.aside = 10.0;
+  EXPECT_THROW(options.validate(), OptionsError);
   options = {};
   options.frames = 3;
   SimulatedSource source(options);

@@ -142,9 +142,11 @@ void merge(const MergeArguments& arguments) {
         "--vocabulary");
   }
   const auto vocabulary = std::make_shared<const Vocabulary>(Vocabulary::load(words));
-  SavedMap merged = load_map(arguments.maps.front());
-  for (std::size_t i = 1; i < arguments.maps.size(); ++i) {
-    const SavedMap next = load_map(arguments.maps[i]);
+  std::vector<SavedMap> maps;  // all of them first: an error at the end would cost the work until then
+  for (const auto& file : arguments.maps) maps.push_back(load_map(file));
+  SavedMap merged = std::move(maps.front());
+  for (std::size_t i = 1; i < maps.size(); ++i) {
+    const SavedMap& next = maps[i];
     Progress progress(next.map.keyframe_count(), arguments.quiet || arguments.json);
     merged = merge_maps(merged, next, vocabulary, options.loop_settings(),
                         [&](std::size_t done) { progress.show(done, "keyframes searched for"); });
@@ -204,9 +206,9 @@ void export_map(const ExportArguments& arguments) {
       if (keyframe.flight != flight || keyframe.world != world) continue;
       trajectory.push_back({keyframe.timestamp, keyframe.T_camera_world.inverse()});
     }
-    if (trajectory.empty() && arguments.flight) {
+    if (trajectory.empty()) {
       throw InputError(arguments.file.string() + ": no keyframe of flight " + std::to_string(flight) +
-                       "; roslam map info tells how many flights there are, counted from 0");
+                       " in its largest part; choose another --flight, counted from 0 (roslam map info)");
     }
     write_trajectory(arguments.keyframes, trajectory);
   }

@@ -49,6 +49,10 @@ void require_poses(const Slam& slam, const RunSummary& summary, const FrameSourc
   if (slam.frames() == 0) {
     throw InputError(name + ": no frame could be used" + skipped + "; check the images and --camera");
   }
+  if (!slam.options().keyframes.enabled) {
+    throw InputError(name + ": no frame was recognised in the map" + skipped +
+                     "; fly where the map was made, or leave out --localise-only");
+  }
   const std::string reasons = skipped + in_words(source.skipped_depth());
   if (summary.without_depth == slam.frames()) {
     throw InputError(name + ": no frame could be tracked, none has depth" + reasons +
@@ -90,7 +94,15 @@ std::shared_ptr<const Vocabulary> open_vocabulary(const RunArguments& arguments,
   return nullptr;
 }
 
-void print_map(const Slam& slam) {
+std::optional<SavedMap> open_map(const RunArguments& arguments) {
+  if (arguments.map.empty()) return std::nullopt;
+  return load_map(arguments.map);
+}
+
+void print_map(const Slam& slam, bool has_map) {
+  if (has_map && !slam.has_met_map()) {
+    std::printf("note: no place of the map was seen again; poses are in coordinates of their own\n");
+  }
   for (const auto& loop : slam.loops()) {
     std::printf(
         "loop: keyframe %u showed the place of keyframe %u again; it moved by %.3f m, %.2f degrees%s\n",
@@ -107,7 +119,7 @@ void print_map(const Slam& slam) {
               slam.map().landmark_count());
 }
 
-void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder& folder) {
+void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder& folder, bool has_map) {
   const auto times = slam.times().summary();
   const std::size_t tracked = slam.trajectory().size();
   std::printf(
@@ -124,7 +136,7 @@ void print_summary(const Slam& slam, const RunSummary& summary, const RunFolder&
   for (const auto& [fault, count] : slam.labelling_faults()) {
     std::printf("note: %s (%zu times)\n", fault.c_str(), count);
   }
-  print_map(slam);
+  print_map(slam, has_map);
   if (const auto found = times.find("tracking"); found != times.end()) {
     std::printf("tracking: median %.1f ms, p95 %.1f ms of processor time a frame\n", found->second.median_ms,
                 found->second.p95_ms);
@@ -164,12 +176,13 @@ void execute(const RunArguments& arguments, const std::string& version) {
   check(arguments, options);
   const InterruptWatcher interrupt;
   const auto source = open_source(arguments.source);
+  auto map = open_map(arguments);
   const RunFolder folder(arguments.out);
   RunDescription description{arguments.source.name, arguments.source.camera, version, {}, arguments.map};
   const auto segmenter = open_segmenter(arguments, options, description.segmentation_model);
   Slam slam(source->camera(), options, arguments.real_time ? Mode::kRealTime : Mode::kDeterministic,
             segmenter, open_vocabulary(arguments, options));
-  if (!arguments.map.empty()) slam.continue_from(load_map(arguments.map));
+  if (map) slam.continue_from(std::move(*map));
   std::optional<RemovalLog> log;
   RemovalLog::remove_old(folder.path());
   if (options.removal.is_on()) {
@@ -200,7 +213,7 @@ void execute(const RunArguments& arguments, const std::string& version) {
   if (arguments.json) {
     std::cout << nlohmann::json::parse(run_report(slam, summary, *source, description)).dump() << "\n";
   } else {
-    print_summary(slam, summary, folder);
+    print_summary(slam, summary, folder, !arguments.map.empty());
   }
   require_written_output();
 }
@@ -245,7 +258,9 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "Weights of the network that labels (ONNX), in place of those that come with the program");
   command->add_option("--vocabulary", arguments->vocabulary,
                       "Words that places are recognised by, in place of those that come with the program");
-  command->add_flag("--no-loops", arguments->no_loops, "Close no loops; the path is then as odometry has it");
+  command->add_flag(
+      "--no-loops", arguments->no_loops,
+      "Recognise no places by their words and close no loops; the path is then as odometry has it");
   command->add_option("--map", arguments->map,
                       "Go on from the map of an earlier flight with this camera (map.roslam of its folder)");
   command->add_flag("--localise-only", arguments->localise_only,

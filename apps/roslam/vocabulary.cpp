@@ -71,7 +71,7 @@ void train(const TrainArguments& arguments) {
       {"out", arguments.out.string()}, {"words", vocabulary.words()}, {"bytes", fs::file_size(arguments.out)},
       {"pictures", pictures.size()},   {"descriptors", descriptors},  {"skipped", source->skipped()}};
   if (arguments.json) {
-    std::cout << summary.dump() << "\n";
+    std::cout << summary.dump(-1, ' ', false, Json::error_handler_t::replace) << "\n";
   } else {
     for (const auto& [reason, count] : source->skipped())
       std::cout << "skipped " << count << ": " << reason << "\n";

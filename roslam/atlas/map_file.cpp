@@ -99,7 +99,8 @@ class Decoder {
   SavedMap decode() {
     SavedMap saved;
     saved.name = in_.name();
-    saved.camera = camera_ = get_camera();
+    saved.camera = get_camera();
+    bounds_ = saved.camera.undistorted_bounds();
     saved.map = Map(get_scales());
     levels_ = saved.map.scales().size();
     saved.vocabulary = in_.get<std::uint64_t>();
@@ -114,6 +115,8 @@ class Decoder {
     for (std::size_t i = 0; i < loops; ++i) {
       const KeyframeId from = get_keyframe_id(saved.map);
       const KeyframeId to = get_keyframe_id(saved.map);
+      require(from != to && saved.map.find(from)->world == saved.map.find(to)->world,
+              "it has a loop that closes nothing");
       saved.map.add_loop(from, to, get_motion());
     }
     require(in_.left() == 0, "something follows its end");
@@ -180,7 +183,7 @@ class Decoder {
     float last = 0.0F;
     for (float& scale : scales) {
       scale = get_finite<float>();
-      require(scale > last && scale < 1e6F, "its pyramid levels do not grow");
+      require(scale > 1.01F * last && scale < 1e6F, "its pyramid levels do not grow");
       last = scale;
     }
     return scales;
@@ -189,6 +192,7 @@ class Decoder {
   std::shared_ptr<const ObservedFrame> get_view() {
     const auto view = std::make_shared<ObservedFrame>();
     const std::size_t points = in_.get_count(kPointBytes);
+    require(points > 0, "it has a keyframe without points");
     bool any_moves = false;
     for (std::size_t i = 0; i < points; ++i) {
       const auto x = get_finite<float>();
@@ -205,7 +209,7 @@ class Decoder {
       any_moves = any_moves || view->is_movable.back();
     }
     if (!any_moves) view->is_movable.clear();
-    view->grid = FeatureGrid(view->pixels, camera_.undistorted_bounds());
+    view->grid = FeatureGrid(view->pixels, bounds_);
     return view;
   }
 
@@ -228,7 +232,7 @@ class Decoder {
       words[i].first = in_.get<std::uint32_t>();
       words[i].second = get_finite<float>();
       require(i == 0 || words[i].first > words[i - 1].first, "its words are out of order");
-      require(words[i].second > 0.0F && words[i].second <= 1.0F, "it has a word of impossible weight");
+      require(words[i].second > 0.0F && words[i].second <= 1.001F, "it has a word of impossible weight");
     }
     return words;
   }
@@ -246,6 +250,8 @@ class Decoder {
     landmark.descriptor = get_descriptor();
     landmark.min_distance = get_finite<float>();
     landmark.max_distance = get_finite<float>();
+    require(landmark.min_distance >= 0.0F && landmark.max_distance >= landmark.min_distance,
+            "it has a landmark that can be recognised nowhere");
     landmark.created_by = get_keyframe_id(map);
     landmark.predicted = in_.get<std::uint32_t>();
     landmark.found = in_.get<std::uint32_t>();
@@ -256,6 +262,8 @@ class Decoder {
     for (auto& observation : landmark.observations) {
       observation = {get_keyframe_id(map), in_.get<std::uint32_t>()};
       const auto& seen = map.find(observation.keyframe)->landmarks;
+      require(map.world_of(observation.keyframe) == map.world_of(landmark.observations.front().keyframe),
+              "it has a landmark in two worlds");
       require(observation.point < seen.size(), "it names a point that it lacks");
       require(!seen[observation.point].is_valid(), "it has a point that shows two landmarks");
       require(
@@ -266,7 +274,7 @@ class Decoder {
   }
 
   BinaryReader in_;
-  Camera camera_;
+  std::array<double, 4> bounds_{};  // of undistorted pixels
   std::size_t levels_ = 0;
 };
 }  // namespace

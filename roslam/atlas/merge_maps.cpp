@@ -27,8 +27,9 @@ SavedMap merge_maps(const SavedMap& first, const SavedMap& second,
     closer.process(KeyframeId{i});
     if (progress) progress(i - begin + 1);
   }
-  const bool have_met = std::any_of(closer.closed().begin(), closer.closed().end(),
-                                    [](const ClosedLoop& loop) { return loop.joins; });
+  const bool have_met =
+      std::any_of(closer.closed().begin(), closer.closed().end(),
+                  [&](const ClosedLoop& loop) { return loop.joins && loop.place.value < begin; });
   if (!have_met) {
     throw InputError(first.name + " and " + second.name + ": no place of one is recognised in the other; " +
                      "merge maps that overlap, seen from about the same side");

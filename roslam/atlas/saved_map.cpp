@@ -2,6 +2,7 @@
 #include "roslam/atlas/saved_map.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "roslam/error.hpp"
@@ -11,8 +12,11 @@ namespace roslam {
 namespace {
 // What decides where a point of the world is seen; how depth is stored and how fast frames come does not.
 bool see_alike(const Camera& a, const Camera& b) {
-  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy && a.cx == b.cx &&
-         a.cy == b.cy && a.distortion == b.distortion;
+  // Camera files round.
+  const auto alike = [](double x, double y) { return std::abs(x - y) <= 1e-9 * std::max(1.0, std::abs(x)); };
+  return a.width == b.width && a.height == b.height && alike(a.fx, b.fx) && alike(a.fy, b.fy) &&
+         alike(a.cx, b.cx) && alike(a.cy, b.cy) &&
+         std::equal(a.distortion.begin(), a.distortion.end(), b.distortion.begin(), alike);
 }
 
 std::string in_words(const Camera& camera) {
@@ -28,6 +32,11 @@ SavedMap SavedMap::of(const Camera& camera, const Map& map, const PlaceIndex* pl
   saved.camera = camera;
   saved.map = Map({map.scales().begin(), map.scales().end()});
   saved.map.append(map);
+  // What adjustment threw to infinity is of no use to anybody, and no reader would take it.
+  for (const LandmarkId id : saved.map.landmark_ids()) {
+    const Eigen::Vector3d& position = saved.map.find(id)->position;
+    if (!position.allFinite() || position.cwiseAbs().maxCoeff() > 1e6) saved.map.remove_landmark(id);
+  }
   if (places == nullptr) return saved;
   saved.vocabulary = places->vocabulary().fingerprint();
   for (const KeyframeId id : map.keyframe_ids()) {

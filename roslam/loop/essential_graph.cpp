@@ -21,8 +21,8 @@ void weigh(std::span<PoseGraph::Edge> edges) {
 }
 }  // namespace
 
-EssentialGraph EssentialGraph::of(const Map& map, MapMutex& map_mutex, int min_shared,
-                                  const LoopClosure& closing) {
+std::optional<EssentialGraph> EssentialGraph::of(const Map& map, MapMutex& map_mutex, int min_shared,
+                                                 const LoopClosure& closing) {
   constexpr std::size_t kAtOnce = 10;  // keyframes read under one lock
   constexpr std::size_t kNone = ~std::size_t{0};
   EssentialGraph result;
@@ -31,6 +31,7 @@ EssentialGraph EssentialGraph::of(const Map& map, MapMutex& map_mutex, int min_s
   std::vector<LoopClosure> loops;
   {
     const std::scoped_lock lock(map_mutex);
+    if (map.find(closing.from) == nullptr || map.find(closing.to) == nullptr) return std::nullopt;
     result.keyframes = map.keyframe_ids();
     node_of.resize(map.keyframe_slots(), kNone);
     const std::set<KeyframeId> origins = map.origins();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "roslam/loop/map_correction.hpp"
@@ -16,10 +17,11 @@ struct EssentialGraph {
   PoseGraph graph;
   std::vector<KeyframeId> keyframes;  ///< of each node
 
-  /// The first keyframe of each world is fixed. min_shared: landmarks that make a pair. closing: a loop
-  /// between living keyframes that is not in the map yet; the last edge. Takes the mutex for a few
+  /// The first keyframe of each world is fixed. min_shared: landmarks that make a pair. closing: a loop that
+  /// is not in the map yet; the last edge. Nothing if one of its keyframes is gone. Takes the mutex for a few
   /// milliseconds at a time.
-  static EssentialGraph of(const Map& map, MapMutex& map_mutex, int min_shared, const LoopClosure& closing);
+  static std::optional<EssentialGraph> of(const Map& map, MapMutex& map_mutex, int min_shared,
+                                          const LoopClosure& closing);
 
   /// What has to happen to the map for its keyframes to lie as in the graph; before: the graph as it was
   /// taken.

@@ -34,14 +34,19 @@ GlobalBundle GlobalBundle::of(const Map& map, MapMutex& map_mutex, const Measure
     const std::scoped_lock lock(map_mutex);
     for (std::size_t i = begin; i < std::min(begin + kAtOnce, candidates.size()); ++i) {
       const Landmark* landmark = map.find(candidates[i]);
-      // Seen once only, a landmark says nothing about the poses.
-      if (landmark == nullptr || landmark->observations.size() < 2) continue;
+      if (landmark == nullptr) continue;
+      const std::size_t first = terms.size();
       for (const auto& observation : landmark->observations) {
         const std::size_t k = observation.keyframe.index();
         if (k >= is_in.size() || !is_in[k]) continue;  // came since
         const ObservedFrame& view = *map.find(observation.keyframe)->view;
         terms.push_back(
             {pose_of[k], result.landmarks.size(), map.measurement(view, observation.point, noise)});
+      }
+      // Seen once only, a landmark says nothing about the poses.
+      if (terms.size() < first + 2) {
+        terms.resize(first);
+        continue;
       }
       result.problem.points.push_back(landmark->position);
       result.landmarks.push_back(candidates[i]);

@@ -34,7 +34,7 @@ void LoopCloser::process(KeyframeId keyframe, const std::function<bool()>& shoul
   times_.recognise = watch.seconds();
   if (!loop) return;
   watch = {};
-  const bool is_closed = join_worlds(*loop) || straighten(*loop, should_stop);
+  const bool is_closed = join_worlds(*loop) || straighten(*loop);
   times_.correct = watch.seconds();
   if (!is_closed) return;
   watch = {};
@@ -78,8 +78,8 @@ bool LoopCloser::join_worlds(const Loop& loop) {
   const WorldId resting = is_newer ? place->world : keyframe->world;
   MapCorrection correction;
   for (const KeyframeId id : map_.keyframe_ids()) {
-    if (map_.find(id)->world != moving) continue;
-    correction.T_old_new[id] = is_newer ? T_place_keyframe.inverse() : T_place_keyframe;
+    const bool moves = map_.find(id)->world == moving;
+    correction.T_old_new[id] = !moves ? SE3() : (is_newer ? T_place_keyframe.inverse() : T_place_keyframe);
   }
   correction.apply_to(map_);
   map_.join_worlds(moving, resting);
@@ -97,7 +97,7 @@ void LoopCloser::note(const Loop& loop, const SE3& T_camera_old, bool joins) {
   closed_.push_back({loop.keyframe, loop.match.place, moved.norm(), turned, loop.match.inliers, joins});
 }
 
-bool LoopCloser::straighten(const Loop& loop, const std::function<bool()>& should_stop) {
+bool LoopCloser::straighten(const Loop& loop) {
   LoopClosure closing{loop.match.place, loop.keyframe, {}};
   {
     const std::scoped_lock lock(map_mutex_);
@@ -105,10 +105,12 @@ bool LoopCloser::straighten(const Loop& loop, const std::function<bool()>& shoul
     if (place == nullptr || map_.find(closing.to) == nullptr) return false;
     closing.T_to_from = loop.match.T_camera_world * place->T_camera_world.inverse();
   }
-  EssentialGraph essential = EssentialGraph::of(map_, map_mutex_, settings_.closer.min_shared, closing);
+  auto taken = EssentialGraph::of(map_, map_mutex_, settings_.closer.min_shared, closing);
+  if (!taken) return false;
+  EssentialGraph& essential = *taken;
   const PoseGraph before = essential.graph;
   detector_.reset();
-  if (!adjust_pose_graph(essential.graph, settings_.pose_graph, should_stop).is_usable) return false;
+  if (!adjust_pose_graph(essential.graph, settings_.pose_graph).is_usable) return false;
   // A wrong loop asks for more than the map can give.
   if (edge_error(essential.graph, essential.graph.edges.back(), settings_.pose_graph).norm() >
       settings_.closer.max_error) {

@@ -76,7 +76,7 @@ class LoopCloser {
 
  private:
   std::optional<Loop> recognise(KeyframeId keyframe);
-  bool straighten(const Loop& loop, const std::function<bool()>& should_stop);
+  bool straighten(const Loop& loop);
   bool join_worlds(const Loop& loop);
   void note(const Loop& loop, const SE3& T_camera_old, bool joins);
   void fuse(const Loop& loop);

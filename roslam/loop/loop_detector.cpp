@@ -19,7 +19,10 @@ double path_between(const Map& map, KeyframeId from, KeyframeId to) {
   for (std::uint32_t i = from.value; i <= to.value; ++i) {
     const Keyframe* keyframe = map.find(KeyframeId{i});
     if (keyframe == nullptr) continue;
-    if (last != nullptr) length += (centre(keyframe->T_camera_world) - centre(last->T_camera_world)).norm();
+    // Between flights nothing was flown.
+    const bool follows =
+        last != nullptr && last->flight == keyframe->flight && last->world == keyframe->world;
+    if (follows) length += (centre(keyframe->T_camera_world) - centre(last->T_camera_world)).norm();
     last = keyframe;
   }
   return length;
@@ -131,7 +134,9 @@ bool LoopDetector::is_plausible(const Map& map, KeyframeId keyframe, const Place
 // How many keyframes recognised places so far as this one did, itself included.
 int LoopDetector::support(const Map& map, KeyframeId keyframe, const PlaceMatch& match) {
   const SE3& T_camera_new = map.find(keyframe)->T_camera_world;
+  const std::pair worlds(map.find(keyframe)->world, map.find(match.place)->world);
   for (auto& suspicion : suspicions_) {
+    if (suspicion.worlds != worlds) continue;
     // Where the camera would be if the suspicion were right.
     const SE3 expected = T_camera_new * suspicion.T_old_new.inverse();
     if (!are_near(expected, match.T_camera_world, options_.tolerance, options_.angle_tolerance)) continue;
@@ -139,7 +144,7 @@ int LoopDetector::support(const Map& map, KeyframeId keyframe, const PlaceMatch&
     suspicion.newest = keyframe;
     return ++suspicion.count;
   }
-  suspicions_.push_back({match.T_camera_world.inverse() * T_camera_new, keyframe, 1});
+  suspicions_.push_back({match.T_camera_world.inverse() * T_camera_new, worlds, keyframe, 1});
   return 1;
 }
 

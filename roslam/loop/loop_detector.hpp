@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "roslam/map/map.hpp"
@@ -54,6 +55,7 @@ class LoopDetector {
   // What recent keyframes recognised, as a motion of the world: where their part of the map should be moved.
   struct Suspicion {
     SE3 T_old_new;
+    std::pair<WorldId, WorldId> worlds;  // of the keyframe and of the place
     KeyframeId newest;
     int count = 1;
   };

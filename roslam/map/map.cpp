@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace roslam {
 
@@ -38,13 +39,22 @@ LandmarkId Map::insert(Landmark landmark) {
 }
 
 void Map::append(const Map& other) {
-  const std::uint32_t worlds = keyframe_count_ > 0 ? newest_world_ + 1 : 0;
-  const std::uint32_t flights = keyframe_count_ > 0 ? flight_ + 1 : 0;
+  // Numbers of worlds and flights without gaps, too.
+  std::map<WorldId, WorldId> world_of;
+  std::map<std::uint32_t, std::uint32_t> flight_of;
+  for (const KeyframeId id : other.keyframe_ids()) {
+    world_of[other.find(id)->world];
+    flight_of[other.find(id)->flight];
+  }
+  std::uint32_t next_world = keyframe_count_ > 0 ? newest_world_ + 1 : 0;
+  std::uint32_t next_flight = keyframe_count_ > 0 ? flight_ + 1 : 0;
+  for (auto& [theirs, ours] : world_of) ours = WorldId{next_world++};
+  for (auto& [theirs, ours] : flight_of) ours = next_flight++;
   std::vector<KeyframeId> id_of(other.keyframe_slots());
   for (const KeyframeId id : other.keyframe_ids()) {
     Keyframe keyframe = *other.find(id);
-    keyframe.world.value += worlds;
-    keyframe.flight += flights;
+    keyframe.world = world_of.at(keyframe.world);
+    keyframe.flight = flight_of.at(keyframe.flight);
     id_of[id.index()] = insert(std::move(keyframe));
   }
   for (const LandmarkId id : other.landmark_ids()) {

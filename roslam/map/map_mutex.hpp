@@ -5,8 +5,8 @@
 
 namespace roslam {
 
-/// Guards a map that several threads share. Fair: who waits is next, so that a thread that takes it again and
-/// again for short work never keeps the tracker waiting for longer than one such piece.
+/// Guards a map that several threads share. Who waits comes before who has just let go of it, so that a
+/// thread that takes it again and again for short work does not keep the others waiting for all of it.
 class MapMutex {
  public:
   void lock() {

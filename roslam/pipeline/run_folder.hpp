@@ -24,9 +24,10 @@ struct RunDescription {
 ///   trajectory.txt  poses of all tracked frames (TUM format)
 ///   keyframes.txt   poses of the keyframes (TUM format)
 ///   map.ply         landmarks with colour
-///   map.roslam      the map, for another flight (docs/map_format.md); left as it was where there is no new
-///   one trajectory.png  the way flown, seen from above groundtruth.txt the true poses, where the source
-///   knows them (TUM format) run.json        effective options, counts, times of every stage, memory
+///   map.roslam      the map, for another flight; kept where there is no new one
+///   trajectory.png  the way flown, seen from above
+///   groundtruth.txt the true poses, where the source knows them (TUM format)
+///   run.json        effective options, counts, times of every stage, memory
 class RunFolder {
  public:
   /// Creates the folder. Throws OutputError at once, before any work is lost, if nothing can be written there

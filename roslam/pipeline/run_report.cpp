@@ -127,6 +127,7 @@ Json map_json(const Slam& slam, const RunDescription& description) {
   std::size_t apart = 0;
   for (const auto& [world, frames] : slam.frames_apart()) apart += frames;
   return {{"from", description.map.empty() ? Json(nullptr) : Json(description.map)},
+          {"met", description.map.empty() ? Json(nullptr) : Json(slam.has_met_map())},
           {"localise_only", !slam.options().keyframes.enabled},
           {"worlds", slam.map().worlds().size()},
           {"frames_apart", apart}};

@@ -2,6 +2,7 @@
 #include "roslam/pipeline/slam.hpp"
 
 #include <cmath>
+#include <exception>
 #include <opencv2/imgproc.hpp>
 
 #include "roslam/error.hpp"
@@ -23,6 +24,13 @@ const Options& validated(const Options& options) {
   return options;
 }
 
+// Worlds that no loop closer could ever join are not begun.
+Tracker::Settings tracker_settings(const Options& options, bool has_vocabulary) {
+  Tracker::Settings settings = options.tracker_settings();
+  if (!has_vocabulary || !options.loop.enabled) settings.tracker.new_world_frames = 0;
+  return settings;
+}
+
 std::vector<float> level_scales(const OrbExtractor& extractor) {
   std::vector<float> scales;
   for (int level = 0; level < extractor.levels(); ++level) scales.push_back(extractor.scale(level));
@@ -39,7 +47,7 @@ Slam::Slam(const Camera& camera, const Options& options, Mode mode, std::shared_
       removal_(camera, options.removal_settings()),
       extractor_(options.orb),
       map_(level_scales(extractor_)),
-      tracker_(camera, map_, options.tracker_settings()),
+      tracker_(camera, map_, tracker_settings(options, vocabulary != nullptr)),
       keyframe_policy_(options.keyframes),
       mapper_(camera, map_, map_mutex_, options.mapper_settings()),
       closing_([this](auto&&... work) { close_loops(work...); }, mode, kLoopPatience),
@@ -51,9 +59,9 @@ Slam::Slam(const Camera& camera, const Options& options, Mode mode, std::shared_
 
 void Slam::continue_from(SavedMap saved) {
   saved.require_fits(camera_, map_.scales());
+  if (places_) saved.index(*places_);
   map_ = std::move(saved.map);
   map_.begin_flight();
-  if (places_) saved.index(*places_);
 }
 
 void Slam::map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,
@@ -281,8 +289,16 @@ void Slam::note_times(double removal, double extract, double total) {
 }
 
 void Slam::finish() {
-  mapping_.drain();
-  closing_.drain();
+  // Both, whatever the first throws: nobody may change the map any more when results are read.
+  std::exception_ptr failure;
+  for (KeyframeWorker* worker : {&mapping_, &closing_}) {
+    try {
+      worker->drain();
+    } catch (...) {
+      if (!failure) failure = std::current_exception();
+    }
+  }
+  if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace roslam

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -67,8 +68,12 @@ class Slam {
   /// Waits for mapping and loop closing. Call before reading results.
   void finish();
 
-  /// Of several worlds that never met, the one with most tracked frames.
+  /// Of several worlds that never met, that of the map the flight went on from, if the flight was in it; else
+  /// the one with most tracked frames.
   WorldId main_world() const;
+
+  /// True if the main world is that of the map the flight went on from.
+  bool has_met_map() const;
 
   /// Poses of all frames tracked in the main world, with every later correction of the map, in the order of
   /// time.
@@ -116,6 +121,7 @@ class Slam {
   void follow_correction();
   void follow_world(const TrackedFrame& frame);
   std::map<WorldId, std::size_t> frames_by_world() const;
+  std::set<WorldId> known_worlds() const;
   bool is_usable(const Frame& frame);
   Removal find_movables(const Frame& frame, const cv::Mat& grey);
   std::shared_ptr<const ObservedFrame> extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& mask,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <set>
 
 #include "roslam/pipeline/slam.hpp"
 
@@ -28,8 +29,24 @@ std::map<WorldId, std::size_t> Slam::frames_by_world() const {
   return frames;
 }
 
+std::set<WorldId> Slam::known_worlds() const {
+  std::set<WorldId> worlds;
+  for (const KeyframeId id : map_.keyframe_ids()) {
+    const Keyframe& keyframe = *map_.find(id);
+    if (keyframe.flight < map_.flight()) worlds.insert(keyframe.world);
+  }
+  return worlds;
+}
+
+bool Slam::has_met_map() const { return known_worlds().count(main_world()) > 0; }
+
 WorldId Slam::main_world() const {
-  const auto frames = frames_by_world();
+  auto frames = frames_by_world();
+  // What was marked in the map that the flight went on from is to be where it was.
+  const std::set<WorldId> known = known_worlds();
+  const auto in_map = [&](const auto& entry) { return known.count(entry.first) > 0; };
+  if (std::any_of(frames.begin(), frames.end(), in_map))
+    std::erase_if(frames, [&](const auto& entry) { return !in_map(entry); });
   const auto most = std::max_element(frames.begin(), frames.end(),
                                      [](const auto& a, const auto& b) { return a.second < b.second; });
   return most != frames.end() ? most->first : WorldId{0};

@@ -144,7 +144,8 @@ bool Tracker::follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_wor
   // decide.
   const bool matched = ((velocity_ || T_camera_world) && match_last_frame(frame, predicted, 1.0F)) ||
                        match_reference(frame) || match_last_frame(frame, predicted, kWider);
-  return matched && refine_with_local_map(frame, last_.reference);
+  return matched && last_.reference.is_valid() &&
+         refine_with_local_map(frame, map_.T_camera_anchor(last_.reference).first);
 }
 
 std::optional<SE3> Tracker::last_pose() const {
@@ -333,6 +334,8 @@ bool Tracker::predict_hidden(TrackedFrame& frame, const FrameHint& hint) {
 
 bool Tracker::relocalise(TrackedFrame& frame, const FrameHint& hint) {
   const Stopwatch watch;
+  passing_points_.clear();
+  passing_positions_.clear();
   const auto similar = hint.similar_keyframes ? hint.similar_keyframes() : std::vector<KeyframeId>{};
   // Never known, as at the start in a map of another flight, the camera may be anywhere.
   const bool may_be_anywhere =
@@ -358,7 +361,9 @@ void Tracker::count_predictions(const TrackedFrame& frame) {
 void Tracker::remember(const TrackedFrame& frame) {
   const double elapsed = frame.timestamp - last_.timestamp;
   constexpr double kMaxGap = 0.5;  // seconds; after a longer gap the old motion tells nothing
-  if (last_.view != nullptr && elapsed > 0.0 && elapsed < kMaxGap) {
+  const bool is_same_world =
+      last_.reference.is_valid() && map_.world_of(last_.reference) == map_.world_of(frame.reference);
+  if (is_same_world && elapsed > 0.0 && elapsed < kMaxGap) {
     velocity_ = (*frame.T_camera_world * last_pose()->inverse()).log() / elapsed;
   } else {
     velocity_.reset();
