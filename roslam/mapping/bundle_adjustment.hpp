@@ -13,7 +13,7 @@ namespace roslam {
 
 struct BundleAdjustmentOptions {
   int iterations = 6;   ///< Levenberg-Marquardt steps at most
-  int window = 20;      ///< keyframes that move in local bundle adjustment; others that see the same stay put
+  int window = 10;      ///< keyframes that move in local bundle adjustment; others that see the same stay put
   int min_shared = 15;  ///< landmarks a keyframe must share with the newest one to move with it
 
   /// Throws OptionsError naming the field.
