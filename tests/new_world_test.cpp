@@ -30,12 +30,12 @@ class NewWorld : public testing::Test {
   }
   static void TearDownTestSuite() { frames_.reset(); }
 
-  static std::unique_ptr<Slam> make_slam() {
+  static std::unique_ptr<Slam> make_slam(Mode mode = Mode::kDeterministic) {
     Options options;
     options.removal = *removal_from("none", options.removal);
     options.tracker.new_world_frames = kPatience;
     return std::make_unique<Slam>(
-        *camera_preset("simulated"), options, Mode::kDeterministic, nullptr,
+        *camera_preset("simulated"), options, mode, nullptr,
         std::make_shared<const Vocabulary>(Vocabulary::load(ROSLAM_TEST_MODELS "/roslam-orb.vocabulary")));
   }
 
@@ -98,6 +98,24 @@ TEST_F(NewWorld, OfAnotherFlightJoinsTheMapThatItWentOnFrom) {
   const Trajectory poses = second->trajectory();
   EXPECT_EQ(poses.size(), (kEnd - kBack) - (kPatience - 1));
   for (const auto& pose : poses) expect_true(T_map_first.inverse() * pose.T_world_camera, pose.timestamp);
+}
+
+// Tracker, mapper and loop closer on threads of their own, as fast as they can.
+TEST_F(NewWorld, BecomesOneWithTheOldOnThreads) {
+  const auto slam = make_slam(Mode::kRealTime);
+  std::size_t tracked = 0;
+  for (const Frame& frame : *frames_) {
+    const auto result = slam->process(frame);
+    ASSERT_TRUE(result);
+    tracked += result->T_world_camera ? 1 : 0;
+  }
+  slam->finish();
+  EXPECT_GE(tracked, frames_->size() - 2 * kPatience);
+  EXPECT_EQ(slam->map().worlds().size(), 1U);
+  const Trajectory poses = slam->trajectory();
+  EXPECT_EQ(poses.size(), tracked);
+  for (const auto& pose : poses)
+    expect_true(poses.front().T_world_camera.inverse() * pose.T_world_camera, pose.timestamp);
 }
 
 }  // namespace
