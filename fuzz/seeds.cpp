@@ -63,8 +63,8 @@ int main(int count, char** arguments) {
     put("options", options_to_yaml({}));
     put("trajectory", "# time x y z\n1.5 0 0 1 0 0 0 1\n2.5 0 1 1 0 0 0.6 0.8\n");
     put("tum_list", "# time file\n1.5 rgb/1.5.png\n2.5 rgb/2.5.png\n");
-    put("vocabulary",
-        Vocabulary::train(std::vector{random_descriptors(60)}, {.branching = 3, .depth = 3}).content());
+    const std::vector<std::vector<Descriptor>> pictures{random_descriptors(60)};
+    put("vocabulary", Vocabulary::train(pictures, {.branching = 3, .depth = 3}).content());
     put("map", encode_map(small_map()));
   } catch (const Error& error) {
     std::fprintf(stderr, "error: %s\n", error.what());

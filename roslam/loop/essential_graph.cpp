@@ -43,7 +43,8 @@ std::optional<EssentialGraph> EssentialGraph::of(const Map& map, MapMutex& map_m
     loops = map.loops();
     loops.push_back(closing);
   }
-  auto& [nodes, edges] = result.graph;
+  std::vector<PoseGraph::Node>& nodes = result.graph.nodes;
+  std::vector<PoseGraph::Edge>& edges = result.graph.edges;
   // Poses are those of the moment when the nodes were read: the mapper may move keyframes meanwhile.
   const auto tie = [&](std::size_t from, std::size_t to) {
     edges.push_back({from, to, nodes[to].T_node_world * nodes[from].T_node_world.inverse(), 1.0, 1.0, false});
