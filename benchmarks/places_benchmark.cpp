@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <opencv2/imgproc.hpp>
 #include <thread>
 
@@ -82,6 +84,8 @@ void close_loop(benchmark::State& state) {
     MapMutex mutex;
     LoopCloser closer(around.flight.camera(), around.map, around.places, mutex, Options{}.loop_settings());
     std::atomic<double> longest = 0.0;
+    std::mutex pause_mutex;
+    std::condition_variable_any tick;
     std::jthread tracker([&](const std::stop_token& stop) {
       while (!stop.stop_requested()) {
         const auto asked = Clock::now();
@@ -89,7 +93,8 @@ void close_loop(benchmark::State& state) {
           const std::scoped_lock lock(mutex);
           longest = std::max(longest.load(), std::chrono::duration<double>(Clock::now() - asked).count());
         }
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        std::unique_lock pause(pause_mutex);
+        tick.wait_for(pause, stop, std::chrono::milliseconds(1), [] { return false; });
       }
     });
     state.ResumeTiming();

@@ -12,6 +12,7 @@
 #include "apps/roslam/commands.hpp"
 #include "apps/roslam/output.hpp"
 #include "apps/roslam/progress.hpp"
+#include "apps/roslam/sources.hpp"
 #include "roslam/atlas/map_file.hpp"
 #include "roslam/atlas/merge_maps.hpp"
 #include "roslam/error.hpp"
@@ -41,7 +42,7 @@ Eigen::Vector3d extent(const Map& map) {
   std::array<std::vector<double>, 3> coordinates;
   for (const LandmarkId id : map.landmark_ids()) {
     const Landmark& landmark = *map.find(id);
-    if (map.world_of(landmark.observations.front().keyframe) != world) continue;
+    if (map.world_of(landmark) != world) continue;
     for (int axis = 0; axis < 3; ++axis)
       coordinates[static_cast<std::size_t>(axis)].push_back(landmark.position[axis]);
   }
@@ -135,13 +136,12 @@ struct MergeArguments {
 
 void merge(const MergeArguments& arguments) {
   const Options options = arguments.config.empty() ? Options{} : read_options(arguments.config);
-  const fs::path words = arguments.vocabulary.empty() ? shipped_vocabulary() : fs::path(arguments.vocabulary);
-  if (words.empty()) {
+  const auto vocabulary = load_vocabulary(arguments.vocabulary);
+  if (vocabulary == nullptr) {
     throw InputError(
         "models/roslam-orb.vocabulary: not found beside the program; install it or name it with "
         "--vocabulary");
   }
-  const auto vocabulary = std::make_shared<const Vocabulary>(Vocabulary::load(words));
   std::vector<SavedMap> maps;  // all of them first: an error at the end would cost the work until then
   for (const auto& file : arguments.maps) maps.push_back(load_map(file));
   SavedMap merged = std::move(maps.front());
@@ -200,12 +200,7 @@ void export_map(const ExportArguments& arguments) {
   if (!arguments.camera.empty()) write_file(arguments.camera, camera_to_yaml(saved.camera));
   if (!arguments.keyframes.empty()) {
     const std::uint32_t flight = arguments.flight.value_or(map.flight());
-    Trajectory trajectory;
-    for (const KeyframeId id : map.keyframe_ids()) {
-      const Keyframe& keyframe = *map.find(id);
-      if (keyframe.flight != flight || keyframe.world != world) continue;
-      trajectory.push_back({keyframe.timestamp, keyframe.T_camera_world.inverse()});
-    }
+    const Trajectory trajectory = map.trajectory(flight, world);
     if (trajectory.empty()) {
       throw InputError(arguments.file.string() + ": no keyframe of flight " + std::to_string(flight) +
                        " in its largest part; choose another --flight, counted from 0 (roslam map info)");

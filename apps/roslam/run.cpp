@@ -85,9 +85,7 @@ std::shared_ptr<Segmenter> open_segmenter(const RunArguments& arguments, Options
 // worth tracking.
 std::shared_ptr<const Vocabulary> open_vocabulary(const RunArguments& arguments, Options& options) {
   if (!options.loop.enabled) return nullptr;
-  const std::filesystem::path file =
-      arguments.vocabulary.empty() ? shipped_vocabulary() : std::filesystem::path(arguments.vocabulary);
-  if (!file.empty()) return std::make_shared<const Vocabulary>(Vocabulary::load(file));
+  if (auto vocabulary = load_vocabulary(arguments.vocabulary)) return vocabulary;
   options.loop.enabled = false;
   std::cerr << "note: models/roslam-orb.vocabulary: not found beside the program; no loop is closed. Install "
                "it or name it with --vocabulary\n";

@@ -66,6 +66,11 @@ std::optional<SimulatorOptions> simulated_flight(const SourceArguments& argument
   return options;
 }
 
+std::shared_ptr<const Vocabulary> load_vocabulary(const std::string& file) {
+  const std::filesystem::path path = file.empty() ? shipped_vocabulary() : std::filesystem::path(file);
+  return path.empty() ? nullptr : std::make_shared<const Vocabulary>(Vocabulary::load(path));
+}
+
 std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments) {
   if (arguments.camera.empty()) {
     throw InputError(arguments.name +

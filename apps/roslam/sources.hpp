@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "roslam/places/vocabulary.hpp"
 #include "roslam/sources/frame_source.hpp"
 #include "roslam/sources/simulated_options.hpp"
 #include "roslam/sources/tum_source.hpp"
@@ -34,6 +35,9 @@ void add_flight_options(CLI::App& command, SourceArguments& arguments);
 
 /// Opens what the user named. Throws InputError or CalibrationError.
 std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments);
+
+/// The vocabulary in a file, or without a name the one that comes with the program; null if there is none.
+std::shared_ptr<const Vocabulary> load_vocabulary(const std::string& file);
 
 /// The two kinds of sources. The flight is empty if the user named a recording. Both throw as open_source.
 std::optional<SimulatorOptions> simulated_flight(const SourceArguments& arguments);

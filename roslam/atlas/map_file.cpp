@@ -262,7 +262,7 @@ class Decoder {
     for (auto& observation : landmark.observations) {
       observation = {get_keyframe_id(map), in_.get<std::uint32_t>()};
       const auto& seen = map.find(observation.keyframe)->landmarks;
-      require(map.world_of(observation.keyframe) == map.world_of(landmark.observations.front().keyframe),
+      require(map.world_of(observation.keyframe) == map.world_of(landmark),
               "it has a landmark in two worlds");
       require(observation.point < seen.size(), "it names a point that it lacks");
       require(!seen[observation.point].is_valid(), "it has a point that shows two landmarks");
@@ -302,7 +302,7 @@ std::string encode_map(const SavedMap& saved) {
     writer.put(loop.to.value);
     put(writer, loop.T_to_from);
   }
-  return writer.bytes();
+  return std::move(writer).bytes();
 }
 
 SavedMap decode_map(std::string_view content, const std::string& name) {

@@ -9,8 +9,8 @@
 
 namespace roslam {
 
-/// Writes a map to one file (docs/map_format.md), which it replaces whole or not at all. The map's ids must
-/// be without gaps, as SavedMap::of makes them. Throws OutputError.
+/// Writes a map to one file (docs/map_format.md), which it replaces whole or not at all. Its keyframes' ids
+/// must be without gaps, as SavedMap::of makes them. Throws OutputError.
 void save_map(const std::filesystem::path& file, const SavedMap& saved);
 
 /// Reads such a file. Throws InputError naming what is wrong and the remedy.

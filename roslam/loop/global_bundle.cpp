@@ -26,8 +26,8 @@ GlobalBundle GlobalBundle::of(const Map& map, MapMutex& map_mutex, const Measure
   }
   std::vector<bool> is_in(pose_of.size(), false);
   for (const KeyframeId id : result.keyframes) is_in[id.index()] = true;
-  std::vector<BundleProblem::Term>
-      terms;  // of one part; joined with the others, which takes memory, without the lock
+  // Of one part; joined with the others without the lock, as that takes memory.
+  std::vector<BundleProblem::Term> terms;
   for (std::size_t begin = 0; begin < candidates.size(); begin += kAtOnce) {
     result.problem.terms.insert(result.problem.terms.end(), terms.begin(), terms.end());
     terms.clear();

@@ -70,7 +70,6 @@ bool LoopCloser::join_worlds(const Loop& loop) {
   const Keyframe* place = map_.find(loop.match.place);
   if (keyframe == nullptr || place == nullptr || keyframe->world == place->world) return false;
   const SE3 T_camera_old = keyframe->T_camera_world;
-  const SE3 T_to_from = loop.match.T_camera_world * place->T_camera_world.inverse();
   // From the keyframe's world to that of the place.
   const SE3 T_place_keyframe = loop.match.T_camera_world.inverse() * T_camera_old;
   const bool is_newer = keyframe->world > place->world;
@@ -83,7 +82,7 @@ bool LoopCloser::join_worlds(const Loop& loop) {
   }
   correction.apply_to(map_);
   map_.join_worlds(moving, resting);
-  map_.add_loop(loop.match.place, loop.keyframe, T_to_from);
+  map_.add_loop(loop.match.place, loop.keyframe, loop.T_keyframe_place);
   detector_.reset();
   note(loop, T_camera_old, true);
   return true;
@@ -98,13 +97,7 @@ void LoopCloser::note(const Loop& loop, const SE3& T_camera_old, bool joins) {
 }
 
 bool LoopCloser::straighten(const Loop& loop) {
-  LoopClosure closing{loop.match.place, loop.keyframe, {}};
-  {
-    const std::scoped_lock lock(map_mutex_);
-    const Keyframe* place = map_.find(closing.from);
-    if (place == nullptr || map_.find(closing.to) == nullptr) return false;
-    closing.T_to_from = loop.match.T_camera_world * place->T_camera_world.inverse();
-  }
+  const LoopClosure closing{loop.match.place, loop.keyframe, loop.T_keyframe_place};
   auto taken = EssentialGraph::of(map_, map_mutex_, settings_.closer.min_shared, closing);
   if (!taken) return false;
   EssentialGraph& essential = *taken;

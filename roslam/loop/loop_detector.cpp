@@ -76,7 +76,10 @@ std::optional<Loop> LoopDetector::detect(const Map& map, const PlaceIndex& place
     if (map.find(keyframe) == nullptr) return std::nullopt;
     if (!check_.confirm(map, *view, *match, options_.min_inliers)) continue;
     if (!is_plausible(map, keyframe, *match)) continue;
-    if (support(map, keyframe, *match) >= options_.consistent) return Loop{keyframe, *match};
+    if (support(map, keyframe, *match) >= options_.consistent) {
+      const SE3 T_keyframe_place = match->T_camera_world * map.find(match->place)->T_camera_world.inverse();
+      return Loop{keyframe, T_keyframe_place, *match};
+    }
     break;
   }
   return std::nullopt;

@@ -32,8 +32,9 @@ struct LoopDetectorOptions {
 
 /// A place that was left and came back to.
 struct Loop {
-  KeyframeId keyframe;  ///< the newer one
-  PlaceMatch match;     ///< what it shows of the older part of the map
+  KeyframeId keyframe;   ///< the newer one
+  SE3 T_keyframe_place;  ///< as recognised
+  PlaceMatch match;      ///< what it shows of the older part of the map
 };
 
 /// Notices that a keyframe shows a place that its neighbours in the map do not know: candidates by words,

@@ -82,6 +82,15 @@ void Map::join_worlds(WorldId from, WorldId into) {
   }
 }
 
+Trajectory Map::trajectory(std::uint32_t flight, WorldId world) const {
+  Trajectory result;
+  for (const auto& keyframe : keyframes_) {
+    if (!keyframe || keyframe->flight != flight || keyframe->world != world) continue;
+    result.push_back({keyframe->timestamp, keyframe->T_camera_world.inverse()});
+  }
+  return result;
+}
+
 std::set<KeyframeId> Map::origins() const {
   std::set<KeyframeId> result;
   std::set<WorldId> held;

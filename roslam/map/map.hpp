@@ -12,6 +12,7 @@
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/geometry/reprojection.hpp"
 #include "roslam/geometry/se3.hpp"
+#include "roslam/geometry/trajectory.hpp"
 #include "roslam/map/ids.hpp"
 
 namespace roslam {
@@ -118,6 +119,13 @@ class Map {
 
   /// The world of a keyframe, also of one that was removed.
   WorldId world_of(KeyframeId id) const { return find(T_camera_anchor(id).first)->world; }
+
+  WorldId world_of(const Landmark& landmark) const {
+    return find(landmark.observations.front().keyframe)->world;
+  }
+
+  /// Poses of a flight's living keyframes in a world, in the order they were made.
+  Trajectory trajectory(std::uint32_t flight, WorldId world) const;
 
   /// Makes two worlds one that lie to each other by now as they should.
   void join_worlds(WorldId from, WorldId into);

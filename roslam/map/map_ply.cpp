@@ -13,8 +13,7 @@ void write_map_ply(const std::filesystem::path& file, const Map& map, WorldId wo
   static_assert(std::endian::native == std::endian::little, "the PLY header promises little-endian values");
   std::ostringstream out;
   auto ids = map.landmark_ids();
-  std::erase_if(
-      ids, [&](LandmarkId id) { return map.world_of(map.find(id)->observations.front().keyframe) != world; });
+  std::erase_if(ids, [&](LandmarkId id) { return map.world_of(*map.find(id)) != world; });
   out << "ply\nformat binary_little_endian 1.0\ncomment RO-SLAM sparse map, world frame, metres\n"
       << "element vertex " << ids.size() << "\n"
       << "property float x\nproperty float y\nproperty float z\n"

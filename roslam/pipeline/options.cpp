@@ -37,9 +37,7 @@ void Options::validate() const {
 }
 
 Tracker::Settings Options::tracker_settings() const {
-  TrackerOptions effective = tracker;
-  if (!keyframes.enabled) effective.new_world_frames = 0;  // without keyframes there is none
-  return {effective, matcher, pose, local_map, place_check, relocaliser, noise};
+  return {tracker, matcher, pose, local_map, place_check, relocaliser, noise};
 }
 
 DynamicRemoval::Settings Options::removal_settings() const { return {removal, depth, noise, pose}; }

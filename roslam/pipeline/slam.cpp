@@ -24,10 +24,11 @@ const Options& validated(const Options& options) {
   return options;
 }
 
-// Worlds that no loop closer could ever join are not begun.
+// A world without keyframes is none, and one that no loop closer could ever join is not begun.
 Tracker::Settings tracker_settings(const Options& options, bool has_vocabulary) {
   Tracker::Settings settings = options.tracker_settings();
-  if (!has_vocabulary || !options.loop.enabled) settings.tracker.new_world_frames = 0;
+  if (!options.keyframes.enabled || !options.loop.enabled || !has_vocabulary)
+    settings.tracker.new_world_frames = 0;
   return settings;
 }
 

@@ -69,16 +69,7 @@ Trajectory Slam::trajectory() const {
   return result;
 }
 
-Trajectory Slam::keyframes() const {
-  Trajectory result;
-  const WorldId world = main_world();
-  for (const KeyframeId id : map_.keyframe_ids()) {
-    const Keyframe& keyframe = *map_.find(id);
-    if (keyframe.flight != map_.flight() || keyframe.world != world) continue;
-    result.push_back({keyframe.timestamp, keyframe.T_camera_world.inverse()});
-  }
-  return result;
-}
+Trajectory Slam::keyframes() const { return map_.trajectory(map_.flight(), main_world()); }
 
 StageTimes Slam::times() const {
   StageTimes all = times_;

@@ -15,7 +15,8 @@ void RelocaliserOptions::validate() const {
 std::optional<PlaceMatch> Relocaliser::find(const Map& map, const ObservedFrame& frame,
                                             std::span<const KeyframeId> similar, bool search_all) {
   const auto candidates = static_cast<std::size_t>(options_.candidates);
-  for (const KeyframeId id : similar.first(std::min(similar.size(), candidates))) {
+  const auto by_looks = similar.first(std::min(similar.size(), candidates));
+  for (const KeyframeId id : by_looks) {
     if (auto match = check_.match(map, id, frame, options_.min_inliers)) return match;
   }
   std::vector<KeyframeId> keyframes = map.keyframe_ids();
@@ -25,6 +26,7 @@ std::optional<PlaceMatch> Relocaliser::find(const Map& map, const ObservedFrame&
   const auto tries = std::min(candidates, keyframes.size());
   for (std::size_t i = 0; i < tries; ++i) {
     const KeyframeId id = keyframes[(next_ + i) % keyframes.size()];
+    if (std::find(by_looks.begin(), by_looks.end(), id) != by_looks.end()) continue;  // checked above
     if (auto match = check_.match(map, id, frame, options_.min_inliers)) return match;
   }
   if (search_all) next_ = (next_ + tries) % keyframes.size();
