@@ -11,6 +11,7 @@
 #include "roslam/features/feature_grid.hpp"
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/features/orb_extractor.hpp"
+#include "roslam/sources/depth_noise.hpp"
 
 namespace roslam {
 namespace {
@@ -185,6 +186,36 @@ TEST(OrbExtractor, IsUnbiasedAcrossLevels) {
   EXPECT_GE(checked, 3);
 }
 
+TEST(OrbExtractor, MirrorsWithTheImage) {
+  // 640 pixels over the scale of a level are no whole number: a level whose pixels were placed by its nominal
+  // scale alone would be too narrow or too wide, on the right of the image by a pixel and more.
+  const cv::Mat image = textured_image(7);
+  cv::Mat mirrored;
+  cv::flip(image, mirrored, 1);
+  OrbOptions options;
+  options.features = 20000;
+  options.min_fast_threshold =
+      options.fast_threshold;  // so that cells, which are not mirrored, change nothing
+  const OrbExtractor extractor(options);
+  const auto a = extractor.extract(image);
+  const auto b = extractor.extract(mirrored);
+  for (int level = 0; level < options.levels; ++level) {
+    double sum = 0.0;
+    int count = 0;
+    for (const auto& feature : a) {
+      if (feature.level != level) continue;
+      for (const auto& other : b) {
+        const cv::Point2f apart(feature.pixel.x + other.pixel.x - 639.0F, feature.pixel.y - other.pixel.y);
+        if (other.level != level || cv::norm(apart) > 2.0) continue;
+        sum += apart.x;
+        ++count;
+      }
+    }
+    ASSERT_GT(count, 50) << level;
+    EXPECT_NEAR(sum / count, 0.0, 0.1) << level;
+  }
+}
+
 TEST(OrbExtractor, RefusesWhatItCannotUse) {
   EXPECT_THROW(OrbExtractor().extract(cv::Mat()), InputError);
   EXPECT_THROW(OrbExtractor().extract(cv::Mat(480, 640, CV_8UC3)), InputError);
@@ -217,6 +248,29 @@ TEST(Observe, DepthIsUnknownAtEdgesAndWhereInvalid) {
   EXPECT_FLOAT_EQ(frame.depths[0], 2.0F);
   for (const std::size_t i : {1U, 2U, 3U, 4U}) EXPECT_EQ(frame.depths[i], 0.0F) << i;
   EXPECT_FLOAT_EQ(frame.depths[5], 3.0F);
+}
+
+TEST(Observe, NoiseIsNotTakenForAnEdge) {
+  const Camera camera = *camera_preset("d455");
+  for (const float truth : {4.0F, 8.0F, 14.0F}) {
+    DepthNoiseOptions noise;
+    noise.sure_depth = 20.0;  // no holes
+    noise.max_depth = 25.0;
+    const cv::Mat depth = stereo_depth(cv::Mat(480, 640, CV_32FC1, cv::Scalar(truth)), camera, noise, 3);
+    double sum = 0.0;
+    int count = 0;
+    for (int y = 0; y < depth.rows; ++y) {
+      for (int x = 0; x < depth.cols; ++x) {
+        const float believed =
+            depth_at(depth, {static_cast<float>(x), static_cast<float>(y)}, DepthOptions{});
+        if (believed == 0.0F) continue;
+        sum += truth / believed;
+        ++count;
+      }
+    }
+    EXPECT_GT(count, 0.9 * static_cast<double>(depth.total())) << truth;
+    EXPECT_NEAR(sum / count, 1.0, 2e-4) << truth;  // inverse depth is what noise leaves unbiased
+  }
 }
 
 }  // namespace

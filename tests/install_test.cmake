@@ -35,3 +35,18 @@ list(LENGTH written count)
 if(NOT count EQUAL FRAMES)
   message(FATAL_ERROR "the example wrote ${count} poses of ${FRAMES}")
 endif()
+
+# The first flight makes the map, the second goes on from it, one over another street leaves it as it is.
+set(AGAIN ${WORK}/build/fly_again)
+set(VOCABULARY ${WORK}/prefix/share/roslam/models/roslam-orb.vocabulary)
+run_step(${AGAIN} ${WORK}/flight ${WORK}/flight/camera.yaml ${VOCABULARY} ${WORK}/map.roslam)
+run_step(${AGAIN} ${WORK}/flight ${WORK}/flight/camera.yaml ${VOCABULARY} ${WORK}/map.roslam)
+run_step(${PROGRAM} simulate street --seed 2 --frames ${FRAMES} --out ${WORK}/elsewhere)
+file(SHA256 ${WORK}/map.roslam before)
+execute_process(
+  COMMAND ${AGAIN} ${WORK}/elsewhere ${WORK}/elsewhere/camera.yaml ${VOCABULARY} ${WORK}/map.roslam
+  RESULT_VARIABLE result OUTPUT_QUIET ERROR_VARIABLE errors)
+file(SHA256 ${WORK}/map.roslam after)
+if(NOT result EQUAL 1 OR NOT errors MATCHES "never met" OR NOT before STREQUAL after)
+  message(FATAL_ERROR "a flight elsewhere ended with ${result}: ${errors}")
+endif()

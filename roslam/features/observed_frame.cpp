@@ -20,7 +20,7 @@ float depth_at(const cv::Mat& depth, const cv::Point2f& pixel, const DepthOption
   if (x < 0 || y < 0 || x >= depth.cols || y >= depth.rows) return 0.0F;
   const float centre = depth.at<float>(y, x);
   if (!is_known(centre, options)) return 0.0F;
-  const float tolerance = static_cast<float>(options.edge_ratio) * centre;
+  const float tolerance = static_cast<float>(options.edge_ratio + options.edge_growth * centre) * centre;
   for (int ny = std::max(0, y - 1); ny <= std::min(depth.rows - 1, y + 1); ++ny) {
     for (int nx = std::max(0, x - 1); nx <= std::min(depth.cols - 1, x + 1); ++nx) {
       const float neighbour = depth.at<float>(ny, nx);
@@ -37,6 +37,8 @@ void DepthOptions::validate() const {
   }
   if (!(edge_ratio > 0.0 && edge_ratio <= 1.0))
     throw OptionsError("depth.edge_ratio must be above 0 and at most 1");
+  if (!(edge_growth >= 0.0 && edge_growth <= 1.0))
+    throw OptionsError("depth.edge_growth must be 0 to 1 (1/metre)");
 }
 
 ObservedFrame observe(std::span<const OrbFeature> features, const cv::Mat& colour, const cv::Mat& depth,

@@ -33,9 +33,11 @@ struct ObservedFrame {
 
 /// Depth limits of what is believed.
 struct DepthOptions {
-  double min_depth = 0.1;    ///< metres, nearer readings are unknown
-  double max_depth = 20.0;   ///< metres, farther readings are unknown
-  double edge_ratio = 0.05;  ///< depth is unknown where its neighbours differ by more than this share of it
+  double min_depth = 0.1;     ///< metres, nearer readings are unknown
+  double max_depth = 20.0;    ///< metres, farther readings are unknown
+  double edge_ratio = 0.05;   ///< depth is unknown where its neighbours differ by more than this share of it
+  double edge_growth = 0.01;  ///< 1/metre, added to that share for each metre, as noise grows with distance
+                              ///< and must not be taken for an edge
 
   /// Throws OptionsError naming the field.
   void validate() const;

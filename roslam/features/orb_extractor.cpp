@@ -20,10 +20,23 @@ void require(bool condition, const char* message) {
   if (!condition) throw OptionsError(std::string("orb.") + message);
 }
 
-// Pixel centres, not corners, of a level lie on a grid of the full image.
-cv::Point2f to_full_image(const cv::Point2f& pixel, float scale) {
-  return (pixel + cv::Point2f(0.5F, 0.5F)) * scale - cv::Point2f(0.5F, 0.5F);
-}
+// Where a pixel of a level lies in the full image. Sides of levels are whole pixels: 0.2 % beside the nominal
+// scale, which along the width of an image is a pixel, and for a camera that approaches a false speed.
+class ToFullImage {
+ public:
+  ToFullImage(const cv::Size& full, const cv::Size& level)
+      : x_(static_cast<float>(full.width) / static_cast<float>(level.width)),
+        y_(static_cast<float>(full.height) / static_cast<float>(level.height)) {}
+
+  // Centres of pixels, not their corners, lie at whole numbers.
+  cv::Point2f operator()(const cv::Point2f& pixel) const {
+    return {(pixel.x + 0.5F) * x_ - 0.5F, (pixel.y + 0.5F) * y_ - 0.5F};
+  }
+
+ private:
+  float x_;
+  float y_;
+};
 
 // Serves the cells of a grid in turns, strongest point first, until enough points are chosen.
 std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint>& points, const cv::Size& size, int wanted) {
@@ -141,20 +154,19 @@ std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyram
       mask.empty() ? 0.0 : static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
   int surplus = 0;  // what coarser or finer levels could not fill is passed on
   for (std::size_t level = 0; level < pyramid.size(); ++level) {
-    const float scale = scales_[level];
+    const ToFullImage to_full_image(pyramid.front().size(), pyramid[level].size());
     auto points = corners(pyramid[level]);
     if (!mask.empty()) {
       const auto masked = std::stable_partition(points.begin(), points.end(), [&](const cv::KeyPoint& p) {
-        const int x = std::min(static_cast<int>(std::lround(p.pt.x * scale)), mask.cols - 1);
-        const int y = std::min(static_cast<int>(std::lround(p.pt.y * scale)), mask.rows - 1);
-        return mask.at<uchar>(y, x) == 0;
+        const cv::Point2f pixel = to_full_image(p.pt);
+        return mask.at<uchar>(cvRound(pixel.y), cvRound(pixel.x)) == 0;
       });
       if (removed != nullptr) {
         std::vector<cv::KeyPoint> forbidden(masked, points.end());
         const int share = static_cast<int>(std::lround(masked_share * quotas_[level]));
         if (share > 0) {
           for (const auto& p : spread(forbidden, pyramid[level].size(), share))
-            removed->push_back(to_full_image(p.pt, scale));
+            removed->push_back(to_full_image(p.pt));
         }
       }
       points.erase(masked, points.end());
@@ -165,8 +177,6 @@ std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyram
     for (auto& point : points) {
       point.angle = orientation(pyramid[level], point.pt, circle_);
       point.octave = static_cast<int>(level);
-      point.size = static_cast<float>(2 * kPatchRadius + 1) * scale;
-      point.pt = to_full_image(point.pt, scale);
       all.push_back(point);
     }
   }
@@ -195,11 +205,15 @@ std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat
     pyramid.push_back(smaller);
   }
   std::vector<cv::KeyPoint> points = detect(pyramid, mask.empty() ? mask : forbidden(mask), removed);
-  cv::Mat descriptors;
-  if (!points.empty()) describer_->compute(grey, points, descriptors);
   std::vector<OrbFeature> features(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    features[i].pixel = points[i].pt;
+    const auto level = static_cast<std::size_t>(points[i].octave);
+    features[i].pixel = ToFullImage(grey.size(), pyramid[level].size())(points[i].pt);
+    points[i].pt *= scales_[level];  // OpenCV divides by the nominal scale to find the pixel of the level
+  }
+  cv::Mat descriptors;
+  if (!points.empty()) describer_->compute(grey, points, descriptors);
+  for (std::size_t i = 0; i < points.size(); ++i) {
     features[i].level = points[i].octave;
     features[i].angle = points[i].angle;
     std::memcpy(features[i].descriptor.data(), descriptors.ptr(static_cast<int>(i)), sizeof(Descriptor));

@@ -56,6 +56,7 @@ class OrbExtractor {
   float scale(int level) const { return scales_[static_cast<std::size_t>(level)]; }
 
  private:
+  // Points in pixels of their levels.
   std::vector<cv::KeyPoint> detect(const std::vector<cv::Mat>& pyramid, const cv::Mat& mask,
                                    std::vector<cv::Point2f>* removed) const;
   std::vector<cv::KeyPoint> corners(const cv::Mat& level_image) const;

@@ -18,6 +18,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("depth", "min_depth", o.depth.min_depth);
   visit("depth", "max_depth", o.depth.max_depth);
   visit("depth", "edge_ratio", o.depth.edge_ratio);
+  visit("depth", "edge_growth", o.depth.edge_growth);
   visit("noise", "pixel_sigma", o.noise.pixel_sigma);
   visit("noise", "depth_sigma", o.noise.depth_sigma);
   visit("noise", "depth_sigma_growth", o.noise.depth_sigma_growth);
