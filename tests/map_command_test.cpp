@@ -125,6 +125,15 @@ TEST_F(MapCommand, WhatDoesNotFitTogetherIsRefused) {
                      both.string() + "'"),
                  {street.string(), mirrored.string(), "no place of one is recognised in the other"});
   EXPECT_FALSE(fs::exists(both));
+  std::ofstream(kept_ / "patient.yaml") << "tracker: {new_world_frames: 100}\n";
+  const std::string elsewhere = "run '" + data_.string() +
+                                "' --quiet --camera simulated --dynamic none --config '" +
+                                (kept_ / "patient.yaml").string() + "' --out '" + (kept_ / "lost").string() +
+                                "' --map '" + street.string() + "'";
+  const std::string said = "no frame was recognised in the map";
+  expect_refused(run_program(elsewhere, kept_), {data_.string(), said, "leave out --map"});
+  expect_refused(run_program(elsewhere + " --localise-only", kept_), {said, "leave out --localise-only"});
+  EXPECT_FALSE(report_of(kept_ / "lost")["map"]["met"]);
   expect_refused(map("export '" + street.string() + "' --keyframes k.txt --flight 7"),
                  {street.string(), "flight 7"});
   EXPECT_EQ(map("export '" + street.string() + "'").code, 2);

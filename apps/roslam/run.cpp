@@ -49,9 +49,10 @@ void require_poses(const Slam& slam, const RunSummary& summary, const FrameSourc
   if (slam.frames() == 0) {
     throw InputError(name + ": no frame could be used" + skipped + "; check the images and --camera");
   }
-  if (!slam.options().keyframes.enabled) {
+  if (const bool localises = !slam.options().keyframes.enabled; localises || slam.map().flight() > 0) {
     throw InputError(name + ": no frame was recognised in the map" + skipped +
-                     "; fly where the map was made, or leave out --localise-only");
+                     "; fly where the map was made, or leave out " +
+                     (localises ? "--localise-only" : "--map"));
   }
   const std::string reasons = skipped + in_words(source.skipped_depth());
   if (summary.without_depth == slam.frames()) {

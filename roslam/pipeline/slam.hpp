@@ -72,7 +72,7 @@ class Slam {
   /// the one with most tracked frames.
   WorldId main_world() const;
 
-  /// True if the main world is that of the map the flight went on from.
+  /// True if a frame was tracked in the map that the flight went on from; the main world is then of that map.
   bool has_met_map() const;
 
   /// Poses of all frames tracked in the main world, with every later correction of the map, in the order of

@@ -38,7 +38,12 @@ std::set<WorldId> Slam::known_worlds() const {
   return worlds;
 }
 
-bool Slam::has_met_map() const { return known_worlds().count(main_world()) > 0; }
+bool Slam::has_met_map() const {
+  const std::set<WorldId> known = known_worlds();
+  const auto frames = frames_by_world();
+  return std::any_of(frames.begin(), frames.end(),
+                     [&](const auto& entry) { return known.count(entry.first) > 0; });
+}
 
 WorldId Slam::main_world() const {
   auto frames = frames_by_world();
