@@ -14,7 +14,10 @@ from training.segmentation.datasets import DataError
 
 def run_train(arguments):
     options = chosen(arguments, train.TrainingOptions, loss=chosen(arguments, LossOptions))
-    train.Trainer(arguments.data, arguments.out, options, checkpoint.load_network(arguments.segmenter)).run()
+    options.validate()
+    training = samples.TrainingSamples(arguments.data, options.seed, options.batch, options.crop)
+    train.Trainer(training, samples.validation_samples(arguments.data), arguments.out, options,
+                  checkpoint.load_network(arguments.segmenter)).run()
 
 
 def run_evaluate(arguments):

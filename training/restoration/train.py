@@ -10,7 +10,7 @@ from pathlib import Path
 
 import torch
 
-from training.restoration import evaluation, losses, networks, samples
+from training.restoration import evaluation, losses, networks
 from training.segmentation import checkpoint
 from training.segmentation.train import Log, Processes, half_precision, rate_at, sample_loader
 
@@ -62,9 +62,11 @@ def load_generator(file):
 
 
 class Trainer:
-    """Everything a run holds: made anew or from the checkpoint in its folder."""
+    """Everything a run holds: made anew or from the checkpoint in its folder. training: a dataset as
+    samples.TrainingSamples is, in batches of the options' size; validation: a list of samples.Sample; segmenter: a
+    network of training.segmentation, whose features are compared."""
 
-    def __init__(self, folder, out, options, segmenter):
+    def __init__(self, training, validation, out, options, segmenter):
         options.validate()
         self.options, self.out = options, Path(out)
         self.processes = Processes()
@@ -72,8 +74,7 @@ class Trainer:
             raise ValueError("restoration trains in one process")
         self.out.mkdir(parents=True, exist_ok=True)
         self.log = Log(self.out / "log.jsonl", True)
-        self.samples = samples.TrainingSamples(folder, options.seed, options.batch, options.crop)
-        self.validation = samples.validation_samples(folder)
+        self.samples, self.validation = training, validation
         device = self.processes.device
         torch.manual_seed(options.seed)
         self.generator = networks.Generator(networks.variants()[options.variant]).to(device)
@@ -105,6 +106,8 @@ class Trainer:
             "training_options": dataclasses.asdict(self.options)})
 
     def validate(self):
+        if not self.validation:
+            return
         methods = {"gan": lambda sample: evaluation.paint(self.average.network, sample)}
         scored = evaluation.score(self.validation, methods)["gan"]
         self.log.write(step=self.step, **{k: round(v, 4) for k, v in scored.items()})

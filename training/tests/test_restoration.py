@@ -1,14 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import dataclasses
+import io
+import os
 import tempfile
 import unittest
+from contextlib import redirect_stdout
 from pathlib import Path
+
+os.environ["CUDA_VISIBLE_DEVICES"] = ""  # a GPU adds in any order, and no two runs are alike
 
 import cv2
 import numpy as np
 import torch
 
-from training.restoration import evaluation, losses, networks, silhouettes
+from training.restoration import evaluation, losses, networks, silhouettes, train
 from training.restoration.samples import Sample
+from training.segmentation import networks as segmentation_networks
+from training.segmentation.datasets import DataError
 
 
 def person_shape(height=60, width=24):
@@ -211,6 +219,48 @@ class Losses(unittest.TestCase):
         painted[:, 0] = 1.0
         parts, _ = losses.generator_losses(self.image, painted, self.hole, self.static, FlatEyes())
         self.assertGreater(float(parts["semantic"]), 0.3)
+
+
+class FewSamples(torch.utils.data.Dataset):
+    """Noise with a hole: enough to see that a run goes on as if it had never stopped."""
+
+    def __len__(self):
+        return 2 ** 40
+
+    def __getitem__(self, index):
+        picture = np.random.default_rng(index).integers(0, 256, (64, 64, 3), dtype=np.uint8)
+        hole, square = hole_and_square()
+        return picture, hole, square, np.ones_like(hole), index // 2 % len(networks.CLASSES)
+
+
+class Training(unittest.TestCase):
+    def trained(self, folder, *steps):
+        options = train.TrainingOptions(steps=6, batch=2, crop=64, workers=0, warm_up=1, decay_share=0.0, adversary_from=2,
+                                        precision="float")
+        torch.manual_seed(5)
+        segmenter = segmentation_networks.PSPNet(segmentation_networks.variants()["roslam-pspnet"])
+        for last in steps:
+            trainer = train.Trainer(FewSamples(), [], folder, dataclasses.replace(options, steps=last), segmenter)
+            trainer.run()
+        return trainer
+
+    def test_a_run_that_stops_goes_on_where_it_was(self):
+        with tempfile.TemporaryDirectory() as a, tempfile.TemporaryDirectory() as b, redirect_stdout(io.StringIO()):
+            straight, resumed = self.trained(a, 6), self.trained(b, 3, 6)
+            for name in ("generator", "discriminator"):
+                expected, found = (getattr(t, name).state_dict() for t in (straight, resumed))
+                for key, value in expected.items():
+                    self.assertTrue(torch.equal(value, found[key]), f"{name} {key}")
+            generator = train.load_generator(Path(b) / "last.pt")
+            self.assertEqual(generator.options, networks.GeneratorOptions())
+
+    def test_a_checkpoint_of_another_variant_is_refused(self):
+        with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()):
+            self.trained(folder, 1)
+            options = train.TrainingOptions(variant="instance", crop=64)
+            segmenter = segmentation_networks.PSPNet(segmentation_networks.variants()["roslam-pspnet"])
+            with self.assertRaisesRegex(DataError, "another variant"):
+                train.Trainer(FewSamples(), [], folder, options, segmenter)
 
 
 if __name__ == "__main__":
