@@ -18,8 +18,8 @@ def silhouettes(folder, split):
     for data, aspect in ((datasets.cityscapes256(folder, split), 2), (datasets.camvid(folder, split), 1)):
         for labels in data.labels:
             for name, classes in LABELS.items():
-                # CamVid's sets of classes hold one of them or more; a set is of the class if all of it is.
-                numbers = [n for n, members in enumerate(label_set.SETS) if set(members) <= {*classes, 16}]
+                # A label may stand for several train ids (CamVid's do): it is of the class if all of them are.
+                numbers = [n for n, members in enumerate(label_set.SETS) if set(members) <= set(classes)]
                 result[name] += outlines(np.isin(labels, numbers), aspect)
     if split == "train":
         for picture, polygons in datasets.coco_outlines(folder):
