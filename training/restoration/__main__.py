@@ -3,13 +3,10 @@
 import argparse
 import sys
 
-import cv2
-
+from training.command_line import add_options, chosen, run
 from training.restoration import evaluation, samples, train
 from training.restoration.losses import LossOptions
 from training.segmentation import checkpoint
-from training.segmentation.__main__ import add_options, chosen
-from training.segmentation.datasets import DataError
 
 
 def run_train(arguments):
@@ -54,13 +51,7 @@ def main():
     added = command("evaluate", run_evaluate, "compare generators with OpenCV's methods on held-out streets")
     added.add_argument("--checkpoint", nargs="*", default=[], metavar="NAME=FILE")
 
-    arguments = parser.parse_args()
-    cv2.setNumThreads(1)  # a pool of threads does not survive the fork that makes the workers of a loader
-    try:
-        return arguments.run(arguments) or 0
-    except (DataError, ValueError, ArithmeticError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    return run(parser)
 
 
 if __name__ == "__main__":

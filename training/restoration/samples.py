@@ -45,7 +45,7 @@ class TrainingSamples(data.Dataset):
                    "camvid": lambda: datasets.camvid(folder, "train"),
                    "rooms": lambda: datasets.rooms(folder), "coco128": lambda: datasets.coco128(folder)}
         self.sets = [read() for read in readers.values()]
-        self.shapes = silhouettes(folder, "train")
+        self.shapes = silhouettes(folder, "train", self.sets)
         self.seed, self.batch, self.side = seed, batch, side
         weights = np.array([SHARES[s.name][0] for s in self.sets])
         self.probabilities = weights / weights.sum()
@@ -78,7 +78,7 @@ class TrainingSamples(data.Dataset):
 def validation_samples(folder, count=250, seed=7):
     """Held-out streets as they are stored, with held-out silhouettes of people and cars that cover 10 to 30 %."""
     streets = datasets.cityscapes256(folder, "val")
-    shapes = silhouettes(folder, "val")
+    shapes = silhouettes(folder, "val", (streets, datasets.camvid(folder, "val")))
     result = []
     for i in range(min(count, len(streets))):
         rng = np.random.default_rng([seed, i])

@@ -8,19 +8,21 @@ from training.segmentation import datasets, label_set
 
 SMALLEST_SIDE = 24  # pixels an outline must have, so that its shape is one
 LABELS = {"car": (13, 14, 15, 16), "bicycle": (12, 17, 18)}  # train ids; riders sit on what they ride
+ASPECTS = {"cityscapes256": 2, "camvid": 1}  # of sets with such labels: by which their pictures are to be stretched
 COCO = {"car": (2, 5, 6, 7), "bicycle": (1, 3)}
 
 
-def silhouettes(folder, split):
+def silhouettes(folder, split, sets):
     """For each of CLASSES a list of 8-bit masks, 255 inside, cropped to the outline. People are cutouts, cars and
-    bicycles what the datasets label as such and is whole in its picture; what is unknown may have any shape."""
+    bicycles what the datasets label as such and is whole in its picture; what is unknown may have any shape. sets:
+    labelled pictures of the split, of which those in ASPECTS are used."""
     result = {"person": [mask for _, mask in datasets.cutouts(folder, split)], "car": [], "bicycle": []}
-    for data, aspect in ((datasets.cityscapes256(folder, split), 2), (datasets.camvid(folder, split), 1)):
-        for labels in data.labels:
-            for name, classes in LABELS.items():
-                # A label may stand for several train ids (CamVid's do): it is of the class if all of them are.
-                numbers = [n for n, members in enumerate(label_set.SETS) if set(members) <= set(classes)]
-                result[name] += outlines(np.isin(labels, numbers), aspect)
+    for name, classes in LABELS.items():
+        # A label may stand for several train ids (CamVid's do): it is of the class if all of them are.
+        numbers = [n for n, members in enumerate(label_set.SETS) if set(members) <= set(classes)]
+        for data in (s for s in sets if s.name in ASPECTS):
+            for labels in data.labels:
+                result[name] += outlines(np.isin(labels, numbers), ASPECTS[data.name])
     if split == "train":
         for picture, polygons in datasets.coco_outlines(folder):
             for number, polygon in polygons:

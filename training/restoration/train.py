@@ -2,9 +2,6 @@
 """The training loop of generator and discriminator: a CPU, a GPU, or several processes; may stop and go on anywhere."""
 import dataclasses
 import math
-import platform
-import signal
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,7 +9,7 @@ import torch
 
 from training.restoration import evaluation, losses, networks
 from training.segmentation import checkpoint
-from training.segmentation.train import Log, Processes, half_precision, rate_at, sample_loader
+from training.segmentation.train import Log, Loop, Processes, half_precision, rate_at
 
 
 @dataclass(frozen=True)
@@ -52,16 +49,11 @@ class TrainingOptions:
 
 def load_generator(file):
     """The averaged generator of a checkpoint, in evaluation mode."""
-    content = checkpoint.load(file)
-    try:
-        generator = networks.Generator(networks.GeneratorOptions(**content["generator_options"]))
-        generator.load_state_dict(content["average"])
-    except (KeyError, TypeError, RuntimeError) as error:
-        raise checkpoint.DataError(f"{file}: holds no generator of this version ({type(error).__name__})") from error
-    return generator.eval()
+    return checkpoint.load_network(file, "generator_options",
+                                   lambda options: networks.Generator(networks.GeneratorOptions(**options)))
 
 
-class Trainer:
+class Trainer(Loop):
     """Everything a run holds: made anew or from the checkpoint in its folder. training: a dataset as
     samples.TrainingSamples is, in batches of the options' size; validation: a list of samples.Sample; segmenter: a
     network of training.segmentation, whose features are compared."""
@@ -146,32 +138,5 @@ class Trainer:
         torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimiser.step()
 
-    def run(self):
-        """Trains to the last step. Ctrl-C or a termination request saves and stops; the same call goes on."""
-        before = {number: signal.signal(number, lambda *_: setattr(self, "stopped", True))
-                  for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            self.run_to_the_end()
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-
-    def run_to_the_end(self):
-        self.log.write(event="start", step=self.step, variant=self.options.variant, device=str(self.processes.device),
-                       host=platform.machine(), torch=torch.__version__)
-        begin, since = time.monotonic(), []
-        for batch in sample_loader(self.samples, self.step, self.options, self.processes):
-            since.append(self.train_step(*batch))
-            if self.step % 50 == 0:
-                means = {k: sum(s.get(k, 0.0) for s in since) / len(since) for k in since[-1]}
-                self.log.write(step=self.step, **means, seconds=(time.monotonic() - begin) / len(since))
-                begin, since = time.monotonic(), []
-            is_last = self.stopped or self.step == self.options.steps
-            if is_last or self.step % self.options.save_every == 0:
-                self.save()
-            if self.step % self.options.validate_every == 0 or self.step == self.options.steps:
-                self.validate()
-                begin = time.monotonic()
-            if self.stopped:
-                break
-        self.log.write(event="stopped" if self.step < self.options.steps else "end", step=self.step)
+    def begin(self):
+        return lambda batch: self.train_step(*batch)

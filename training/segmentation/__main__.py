@@ -1,37 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """python3 -m training.segmentation COMMAND: see --help and training/README.md."""
 import argparse
-import dataclasses
 import os
 import sys
 
-import cv2
 import torch
 
+from training.command_line import add_options, chosen, run
 from training.segmentation import (ablation, checkpoint, cost, evaluation, export, figures, label_set,
                                    mixture, networks, processes, train)
-from training.segmentation.datasets import DataError
 from training.segmentation.losses import LossOptions
-
-
-def add_options(parser, options_class):
-    """One flag a field of an options dataclass, with its default."""
-    for field in dataclasses.fields(options_class):
-        if dataclasses.is_dataclass(field.type) or field.name == "loss":
-            continue
-        flag = "--" + field.name.replace("_", "-")
-        if field.type is bool or isinstance(field.default, bool):
-            parser.add_argument(flag, action="store_true", default=field.default)
-        elif isinstance(field.default, tuple):
-            parser.add_argument(flag, nargs="*", default=field.default)
-        else:
-            parser.add_argument(flag, type=type(field.default), default=field.default, help=f"default {field.default}")
-
-
-def chosen(arguments, options_class, **more):
-    names = {f.name for f in dataclasses.fields(options_class)} - set(more)
-    values = {n: getattr(arguments, n) for n in names}
-    return options_class(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}, **more)
 
 
 def training_options(arguments):
@@ -133,13 +111,7 @@ def main():
     added.add_argument("--models", nargs="*", default=(), help="TITLE=FILE.onnx")
     added.add_argument("--pictures", nargs="*", default=())
 
-    arguments = parser.parse_args()
-    cv2.setNumThreads(1)  # a pool of threads does not survive the fork that makes the workers of a loader
-    try:
-        return arguments.run(arguments) or 0
-    except (DataError, ValueError, ArithmeticError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    return run(parser)
 
 
 if __name__ == "__main__":

@@ -29,11 +29,11 @@ def load(file):
         raise DataError(f"{file}: not a readable checkpoint ({type(error).__name__})") from error
 
 
-def load_network(file):
-    """The averaged network of a checkpoint, in evaluation mode."""
+def load_network(file, key="network_options", make=lambda options: networks.PSPNet(networks.NetworkOptions(**options))):
+    """The averaged network of a checkpoint, in evaluation mode: made of the options it holds under the key."""
     content = load(file)
     try:
-        network = networks.PSPNet(networks.NetworkOptions(**content["network_options"]))
+        network = make(content[key])
         network.load_state_dict(content["average"])
     except (KeyError, TypeError, RuntimeError) as error:
         raise DataError(f"{file}: holds no network of this version ({type(error).__name__})") from error

@@ -158,7 +158,48 @@ class Log:
             print(" ".join(f"{k} {v:.5g}" if isinstance(v, float) else f"{k} {v}" for k, v in entry.items()), flush=True)
 
 
-class Trainer:
+class Loop:
+    """Steps of training that may stop and go on anywhere. What is trained has options, processes, samples, log, step,
+    stopped, save() and validate(), and begin(), which gives a function of a batch that does a step and returns values to
+    log."""
+
+    def run(self):
+        """Trains to the last step. Ctrl-C or a termination request saves and stops; the same call goes on."""
+        before = {number: signal.signal(number, lambda *_: setattr(self, "stopped", True))
+                  for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            self.run_to_the_end()
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def run_to_the_end(self):
+        self.log.write(event="start", step=self.step, variant=self.options.variant, device=str(self.processes.device),
+                       processes=self.processes.count, host=platform.machine(), torch=torch.__version__)
+        learn = self.begin()
+        begin, since = time.monotonic(), []
+        for batch in sample_loader(self.samples, self.step, self.options, self.processes):
+            since.append(learn(batch))
+            if self.step % 50 == 0:
+                means = {name: sum(values.get(name, 0.0) for values in since) / len(since) for name in since[-1]}
+                self.log.write(step=self.step, **means, rate=rate_at(self.step - 1, self.options),
+                               seconds=(time.monotonic() - begin) / len(since))
+                begin, since = time.monotonic(), []
+            # Asked once a step: all processes have to agree, and a request that comes later waits for the next step.
+            is_stopped = self.processes.any(self.stopped)
+            is_last = is_stopped or self.step == self.options.steps
+            if is_last or self.step % self.options.save_every == 0:
+                self.save()
+            if self.step % self.options.validate_every == 0 or self.step == self.options.steps:
+                self.validate()
+                begin = time.monotonic()
+            if is_stopped:
+                break
+        self.log.write(event="stopped" if self.step < self.options.steps else "end", step=self.step)
+        self.processes.close()
+
+
+class Trainer(Loop):
     """Everything a run holds: made anew or from the checkpoint in its folder. source: mixture.TrainingData."""
 
     def __init__(self, source, out, options, start_from=None):
@@ -243,42 +284,11 @@ class Trainer:
         self.scaler.update()
         self.average.update(self.network, self.step)
         self.step += 1
-        return value, rate
+        return value
 
     def head_weights(self):
         return [self.network.classifier.weight, self.network.auxiliary4[-1].weight, self.network.auxiliary5[-1].weight]
 
-    def run(self):
-        """Trains to the last step. Ctrl-C or a termination request saves and stops; the same call goes on."""
-        before = {number: signal.signal(number, lambda *_: setattr(self, "stopped", True))
-                  for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            self.run_to_the_end()
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-
-    def run_to_the_end(self):
-        self.log.write(event="start", step=self.step, variant=self.options.variant, device=str(self.processes.device),
-                       processes=self.processes.count, host=platform.machine(), torch=torch.__version__)
+    def begin(self):
         network = self.processes.wrap(self.network).train()
-        begin, losses_since = time.monotonic(), []
-        for pictures, labels in sample_loader(self.samples, self.step, self.options, self.processes):
-            loss, rate = self.train_step(network, pictures, labels)
-            losses_since.append(loss)
-            if self.step % 50 == 0:
-                self.log.write(step=self.step, loss=sum(losses_since) / len(losses_since), rate=rate,
-                               seconds=(time.monotonic() - begin) / len(losses_since))
-                begin, losses_since = time.monotonic(), []
-            # Asked once a step: all processes have to agree, and a request that comes later waits for the next step.
-            is_stopped = self.processes.any(self.stopped)
-            is_last = is_stopped or self.step == self.options.steps
-            if is_last or self.step % self.options.save_every == 0:
-                self.save()
-            if self.step % self.options.validate_every == 0 or self.step == self.options.steps:
-                self.validate()
-                begin = time.monotonic()
-            if is_stopped:
-                break
-        self.log.write(event="stopped" if self.step < self.options.steps else "end", step=self.step)
-        self.processes.close()
+        return lambda batch: {"loss": self.train_step(network, *batch)}
