@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/sources.hpp"
 
+#include <iomanip>
+#include <limits>
+#include <sstream>
 #include <string>
 #include <string_view>
 
@@ -64,6 +67,43 @@ std::optional<SimulatorOptions> simulated_flight(const SourceArguments& argument
   options.aside = arguments.aside;
   options.gain = arguments.gain;
   return options;
+}
+
+std::map<std::string, std::string> flight_in_words(const SourceArguments& arguments) {
+  if (!arguments.name.starts_with(kSimulated)) return {};
+  std::map<std::string, std::string> words{{"traffic", arguments.traffic}};
+  const auto add = [&](const char* name, auto value) {
+    std::ostringstream text;
+    text << std::setprecision(std::numeric_limits<double>::max_digits10) << value;
+    words[name] = text.str();
+  };
+  add("frames", arguments.frames);
+  add("seed", arguments.seed);
+  add("speed", arguments.speed);
+  add("altitude", arguments.altitude);
+  add("aside", arguments.aside);
+  add("gain", arguments.gain);
+  return words;
+}
+
+SourceArguments flight_from_words(const std::string& name, const std::map<std::string, std::string>& words) {
+  SourceArguments arguments;
+  arguments.name = name;
+  const auto take = [&](const char* key, auto& value) {
+    const auto found = words.find(key);
+    if (found == words.end()) return;
+    std::istringstream text(found->second);
+    if (!(text >> value))
+      throw InputError(name + ": " + key + " of the flight is no number: " + found->second);
+  };
+  take("traffic", arguments.traffic);
+  take("frames", arguments.frames);
+  take("seed", arguments.seed);
+  take("speed", arguments.speed);
+  take("altitude", arguments.altitude);
+  take("aside", arguments.aside);
+  take("gain", arguments.gain);
+  return arguments;
 }
 
 std::shared_ptr<const Vocabulary> load_vocabulary(const std::string& file) {

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,6 +36,12 @@ void add_flight_options(CLI::App& command, SourceArguments& arguments);
 
 /// Opens what the user named. Throws InputError or CalibrationError.
 std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments);
+
+/// What was chosen of a simulated flight, by the name of its option; empty for a recording.
+std::map<std::string, std::string> flight_in_words(const SourceArguments& arguments);
+
+/// The other way round; what words does not name keeps its default. Throws InputError for what is no number.
+SourceArguments flight_from_words(const std::string& name, const std::map<std::string, std::string>& words);
 
 /// The vocabulary in a file, or without a name the one that comes with the program; null if there is none.
 std::shared_ptr<const Vocabulary> load_vocabulary(const std::string& file);

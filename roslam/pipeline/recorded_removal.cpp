@@ -33,6 +33,13 @@ Options read_options_of_run(const fs::path& file) {
 // Throws Json::exception for what is no whole number from 0.
 std::size_t count_from(const Json& value) { return value.get_ref<const Json::number_unsigned_t&>(); }
 
+RemovedRegion region_from(const Json& object) {
+  const Json& box = object.at("box");
+  const auto kind = movable_from(object.at("class").get_ref<const std::string&>());
+  return {kind.value_or(Movable::kUnknown), square_around({box.at(0).get<int>(), box.at(1).get<int>(),
+                                                           box.at(2).get<int>(), box.at(3).get<int>()})};
+}
+
 struct Line {
   double timestamp = 0.0;
   RecordedFrame frame;
@@ -54,6 +61,7 @@ Line parse(const std::string& text, const fs::path& folder) {
   for (const auto& object : json.at("objects")) {
     const bool rests = object.at("at_rest").get<bool>();
     (rests ? line.frame.resting : moving).insert(count_from(object.at("value")));
+    line.frame.regions.push_back(region_from(object));
     line.frame.has_objects = true;
   }
   for (const std::size_t value : moving)

@@ -6,17 +6,20 @@
 #include <map>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "roslam/evaluation/removal_error.hpp"
 #include "roslam/pipeline/options.hpp"
+#include "roslam/restoration/removed_region.hpp"
 
 namespace roslam {
 
 /// What a run wrote down of one frame's removal.
 struct RecordedFrame {
-  std::filesystem::path mask;     ///< as object_image() makes it; empty if there is none
-  bool has_objects = false;       ///< things were removed; without a mask, it was dropped
-  std::set<std::size_t> resting;  ///< values in the mask of things that the run took to be at rest
+  std::filesystem::path mask;          ///< as object_image() makes it; empty if there is none
+  bool has_objects = false;            ///< things were removed; without a mask, it was dropped
+  std::set<std::size_t> resting;       ///< values in the mask of things that the run took to be at rest
+  std::vector<RemovedRegion> regions;  ///< of the auxiliary descriptor, one for each thing
   CountedPoints points;
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 
 #include "roslam/pipeline/run.hpp"
@@ -18,6 +19,7 @@ struct RunDescription {
   std::string
       segmentation_model;  ///< file of the network that labelled the frames; empty: nothing was removed
   std::string map;         ///< file of the map the flight went on from; empty: none
+  std::map<std::string, std::string> flight;  ///< options of a simulated flight by name; empty: a recording
 };
 
 /// Where the results of a run go:

@@ -150,6 +150,7 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   Json json;
   json["version"] = description.version;
   json["source"] = description.source;
+  if (!description.flight.empty()) json["flight"] = description.flight;
   json["mode"] = slam.mode() == Mode::kDeterministic ? "deterministic" : "real-time";
   json["interrupted"] = summary.interrupted;
   json["error"] = failure_json(summary.failure);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/semantics/label_set.hpp"
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -9,6 +10,8 @@
 namespace roslam {
 
 namespace {
+constexpr std::array<std::string_view, 5> kMovableNames{"none", "person", "car", "bicycle", "unknown"};
+
 constexpr std::array<std::string_view, kClasses> kNames{
     "road",         "sidewalk",   "building", "wall",       "fence",  "pole",  "traffic light",
     "traffic sign", "vegetation", "terrain",  "sky",        "person", "rider", "car",
@@ -68,9 +71,12 @@ Movable movable_of(int label) {
   return label >= 0 && label < kClasses ? kMovable[static_cast<std::size_t>(label)] : Movable::kNone;
 }
 
-std::string_view name_of(Movable movable) {
-  constexpr std::array<std::string_view, 5> kMovableNames{"none", "person", "car", "bicycle", "unknown"};
-  return kMovableNames[static_cast<std::size_t>(movable)];
+std::string_view name_of(Movable movable) { return kMovableNames[static_cast<std::size_t>(movable)]; }
+
+std::optional<Movable> movable_from(std::string_view name) {
+  const auto* const found = std::find(kMovableNames.begin(), kMovableNames.end(), name);
+  if (found == kMovableNames.end()) return std::nullopt;
+  return static_cast<Movable>(found - kMovableNames.begin());
 }
 
 std::optional<LabelSet> label_set_from(std::string_view name) {

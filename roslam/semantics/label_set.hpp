@@ -27,6 +27,9 @@ enum class Movable : std::uint8_t { kNone, kPerson, kCar, kBicycle, kUnknown };
 Movable movable_of(int label);
 std::string_view name_of(Movable movable);
 
+/// The class of that name; nothing for another name.
+std::optional<Movable> movable_from(std::string_view name);
+
 /// A coarser set of classes that labels can be written and scored in.
 struct LabelSet {
   std::string name;                               ///< as on the command line

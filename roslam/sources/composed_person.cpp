@@ -13,9 +13,8 @@ namespace {
 
 constexpr double kNearest = 0.2;  // metres from the camera; nearer there is no picture of a person
 constexpr double kLeastAside =
-    0.3;  // metres from the person along the floor: else the camera looks from above
-constexpr double kDistortionTolerance = 0.5;  // pixels
-constexpr int kSmallestSide = 8;              // pixels of the coarsest picture
+    0.3;                          // metres from the person along the floor: else the camera looks from above
+constexpr int kSmallestSide = 8;  // pixels of the coarsest picture
 
 // How much of each pixel of the mask is person. It fades inside the outline, where colours are the person's
 // and not those of what stood behind.
@@ -110,20 +109,6 @@ struct Billboard {
 };
 
 }  // namespace
-
-PixelRays::PixelRays(const Camera& camera) : camera_(camera), rays_(camera.height, camera.width, CV_32FC2) {
-  for (int y = 0; y < camera.height; ++y) {
-    for (int x = 0; x < camera.width; ++x) {
-      const Eigen::Vector2d pixel(x, y);
-      const Eigen::Vector2d undistorted = camera.undistort(pixel);
-      const Eigen::Vector3d ray = camera.unproject(undistorted, 1.0);
-      const bool is_known = (camera.distort(undistorted) - pixel).norm() < kDistortionTolerance;
-      rays_.at<cv::Vec2f>(y, x) = is_known
-                                      ? cv::Vec2f(static_cast<float>(ray.x()), static_cast<float>(ray.y()))
-                                      : cv::Vec2f::all(std::numeric_limits<float>::quiet_NaN());
-    }
-  }
-}
 
 ComposedPerson::ComposedPerson(const PersonCutout& cutout, const PersonShape& shape) : shape_(shape) {
   cv::Mat colour = cutout.colour;

@@ -5,28 +5,12 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/pixel_rays.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "roslam/sources/composed_walk.hpp"
 #include "roslam/sources/person_cutout.hpp"
 
 namespace roslam {
-
-/// Where each pixel of a camera looks, lens distortion undone: the point (x, y, 1) of its ray in the camera
-/// frame. NaN in corners where distortion cannot be undone.
-class PixelRays {
- public:
-  explicit PixelRays(const Camera& camera);
-
-  const Camera& camera() const { return camera_; }
-  cv::Size size() const { return rays_.size(); }
-  /// The rays of a row of pixels: x and y at z = 1.
-  const cv::Vec2f* row(int y) const { return rays_.ptr<cv::Vec2f>(y); }
-
- private:
-  Camera camera_;
-  cv::Mat rays_;  // CV_32FC2
-};
 
 /// One person as a camera would see them if nothing else were there; all images as large as the camera's.
 struct PersonLayer {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "roslam/geometry/pixel_rays.hpp"
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/sources/composed_person.hpp"
 #include "roslam/sources/composed_walk.hpp"

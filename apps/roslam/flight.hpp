@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <stop_token>
+#include <string>
+
+#include "apps/roslam/sources.hpp"
+#include "roslam/pipeline/run.hpp"
+#include "roslam/pipeline/run_folder.hpp"
+#include "roslam/pipeline/slam.hpp"
+
+namespace roslam::app {
+
+/// What can be asked of a flight.
+struct FlightArguments {
+  SourceArguments source;
+  std::string out;
+  std::string config;
+  bool deterministic = false;
+  bool real_time = false;
+  std::string model;       ///< weights in place of the shipped ones
+  std::string vocabulary;  ///< words in place of the shipped ones
+  bool no_loops = false;
+  std::string map;  ///< to go on from; empty: none
+  bool localise_only = false;
+  std::string dynamic;  ///< empty: as the options say
+  bool video = false;
+  bool quiet = false;  ///< no progress
+};
+
+/// A flight that came to its end.
+struct Flight {
+  std::unique_ptr<FrameSource> source;
+  std::unique_ptr<Slam> slam;
+  RunSummary summary;
+  RunDescription description;
+};
+
+/// The options that the arguments ask for. Throws as read_options does.
+Options options_of(const FlightArguments& arguments);
+
+/// Flies through a source and writes what it finds to the folder `out`, also if the flight is interrupted or
+/// fails. Without the weights of a network, or without a vocabulary, it flies without and says so. Throws
+/// what the flight failed with, OutputError, or InputError if there is not a single pose.
+Flight fly(const FlightArguments& arguments, Options options, const std::string& version,
+           const std::stop_token& stop);
+
+}  // namespace roslam::app

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/restoration_pictures.hpp"
+
+#include "roslam/error.hpp"
+#include "roslam/sources/picture_source.hpp"
+#include "roslam/sources/tum_source.hpp"
+
+namespace roslam::app {
+
+namespace {
+namespace fs = std::filesystem;
+
+constexpr double kSameTime = 0.02;  // seconds between colour and depth
+
+bool is_file(const fs::path& file) {
+  std::error_code error;
+  return fs::is_regular_file(file, error);
+}
+
+// folder: that the files in the lists are relative to.
+std::vector<SequencePicture> listed(const fs::path& folder, const fs::path& colour_list,
+                                    const fs::path& depth_list) {
+  const auto colour = read_tum_list(colour_list);
+  const auto depth = is_file(depth_list) ? read_tum_list(depth_list) : std::vector<TimedFile>{};
+  const auto depth_of = associate(colour, depth, kSameTime);
+  std::vector<SequencePicture> pictures;
+  for (std::size_t i = 0; i < colour.size(); ++i) {
+    SequencePicture picture{colour[i].file.stem().string(), colour[i].timestamp, folder / colour[i].file, {}};
+    if (depth_of[i] >= 0) picture.depth = folder / depth[static_cast<std::size_t>(depth_of[i])].file;
+    pictures.push_back(std::move(picture));
+  }
+  return pictures;
+}
+}  // namespace
+
+std::vector<SequencePicture> pictures_of(const fs::path& folder) {
+  if (is_file(folder / "rgb.txt")) return listed(folder, folder / "rgb.txt", folder / "depth.txt");
+  std::vector<SequencePicture> pictures;
+  for (const auto& file : pictures_in(folder))
+    pictures.push_back({file.stem().string(), std::nullopt, file, {}});
+  if (pictures.empty())
+    throw InputError(folder.string() + ": holds no pictures (PNG or JPEG) and no rgb.txt");
+  return pictures;
+}
+
+std::vector<SequencePicture> background_of(const fs::path& folder) {
+  if (is_file(folder / "background.txt"))
+    return listed(folder, folder / "background.txt", folder / "background_depth.txt");
+  std::error_code error;
+  if (is_file(folder / "rgb.txt") && fs::is_directory(folder / "background" / "rgb", error))
+    return listed(folder / "background", folder / "rgb.txt", folder / "depth.txt");
+  return pictures_of(folder);
+}
+
+}  // namespace roslam::app

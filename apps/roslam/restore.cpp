@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/roslam/commands.hpp"
+#include "apps/roslam/flight.hpp"
+#include "apps/roslam/interrupt.hpp"
+#include "apps/roslam/output.hpp"
+#include "apps/roslam/progress.hpp"
+#include "apps/roslam/restored_folder.hpp"
+#include "apps/roslam/sources.hpp"
+#include "roslam/error.hpp"
+#include "roslam/evaluation/markdown_table.hpp"
+#include "roslam/evaluation/statistics.hpp"
+#include "roslam/geometry/stopwatch.hpp"
+#include "roslam/pipeline/recorded_run.hpp"
+#include "roslam/pipeline/sequence_restorer.hpp"
+#include "roslam/sources/simulated_source.hpp"
+#include "roslam/sources/tum_source.hpp"
+#include "roslam/write_file.hpp"
+
+namespace roslam::app {
+
+namespace {
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct RestoreArguments {
+  FlightArguments flight;  // for what is not flown yet
+  fs::path out;
+  fs::path models;
+  std::string method = "both";
+  bool json = false;
+};
+
+// The flight that a run recorded, from its beginning.
+std::unique_ptr<FrameSource> open_source_of(const RecordedRun& run) {
+  if (!run.flight().empty())
+    return std::make_unique<SimulatedSource>(
+        *simulated_flight(flight_from_words(run.source(), run.flight())));
+  return std::make_unique<TumSource>(run.source(), run.camera());
+}
+
+std::string name_of_files(const FrameSource& source, const Frame& frame) {
+  const auto* recording = dynamic_cast<const TumSource*>(&source);
+  return recording ? recording->colour_file(frame.index).stem().string() : stamp(frame.timestamp);
+}
+
+std::shared_ptr<Inpainter> open_inpainter(const RestoreArguments& arguments) {
+  if (arguments.method != "both" && arguments.method != "gan") return nullptr;
+  const fs::path folder = arguments.models.empty() ? shipped_restoration_models() : arguments.models;
+  if (folder.empty()) {
+    std::cerr << "note: models/roslam-restorer-*.onnx: not found beside the program; what nobody saw is "
+                 "painted by a "
+                 "classic method. Install them or name their folder with --models\n";
+    return nullptr;
+  }
+  return std::make_shared<GanInpainter>(folder);
+}
+
+StaticSceneRestorer::Settings settings_for(const RestoreArguments& arguments, const Options& options) {
+  StaticSceneRestorer::Settings settings;
+  settings.depth = options.depth;
+  settings.restoration.reproject = arguments.method == "both" || arguments.method == "reprojection";
+  settings.restoration.invent = arguments.method != "reprojection";
+  if (arguments.method == "navier-stokes") settings.invention.classic = ClassicMethod::kNavierStokes;
+  return settings;
+}
+
+// The folder of the run, which is made first if the user named something to fly through.
+fs::path run_folder_of(const RestoreArguments& arguments, const std::string& version,
+                       const std::stop_token& stop) {
+  const std::string& name = arguments.flight.source.name;
+  if (RecordedRun::recognises(name)) return name;
+  FlightArguments flight = arguments.flight;
+  flight.out = (arguments.out / "run").string();
+  fly(flight, options_of(flight), version, stop);
+  return flight.out;
+}
+
+struct Restored {
+  std::size_t sources = 0;
+  std::vector<double> milliseconds;  // processor time, of frames with holes
+  std::map<std::string, std::size_t> left_out;
+  bool interrupted = false;
+};
+
+Restored restore_all(const RecordedRun& run, StaticSceneRestorer& restorer, RestoredFolder& folder,
+                     bool quiet, const std::stop_token& stop) {
+  Restored restored;
+  SequenceRestorer sequence(run, restorer);
+  const auto first_pass = open_source_of(run);
+  {
+    Progress progress(first_pass->size(), quiet);
+    while (!stop.stop_requested()) {
+      const auto frame = first_pass->next();
+      if (!frame) break;
+      if (sequence.is_source(frame->timestamp)) sequence.keep(*frame);
+      progress.show(frame->index + 1, "looked through");
+    }
+  }
+  const auto second_pass = open_source_of(run);
+  Progress progress(second_pass->size(), quiet);
+  while (!stop.stop_requested()) {
+    const auto frame = second_pass->next();
+    if (!frame) break;
+    const Stopwatch watch;
+    const auto view = sequence.restore(*frame);
+    if (view) {
+      if (view->pixels_of(Provenance::kMeasured) < view->colour.total())
+        restored.milliseconds.push_back(1000.0 * watch.seconds());
+      folder.add(*frame, *view, name_of_files(*second_pass, *frame));
+    }
+    progress.show(frame->index + 1, "restored");
+  }
+  restored.interrupted = stop.stop_requested();
+  restored.sources = sequence.sources();
+  restored.left_out = sequence.left_out();
+  return restored;
+}
+
+Json report_of(const RestoreArguments& arguments, const RecordedRun& run, const RestoredFolder& folder,
+               const Restored& restored) {
+  const auto hole = static_cast<double>(folder.reprojected() + folder.invented());
+  const auto share = [&](std::size_t pixels) {
+    return hole > 0.0 ? Json(static_cast<double>(pixels) / hole) : Json(nullptr);
+  };
+  return {{"source", run.source()},
+          {"out", arguments.out.string()},
+          {"method", arguments.method},
+          {"interrupted", restored.interrupted},
+          {"frames", folder.frames()},
+          {"left_out", restored.left_out},
+          {"frames_filled_from", restored.sources},
+          {"hole_share", hole / std::max(1.0, hole + static_cast<double>(folder.measured()))},
+          {"reprojected_share_of_hole", share(folder.reprojected())},
+          {"invented_share_of_hole", share(folder.invented())},
+          {"processor_milliseconds_a_frame",
+           restored.milliseconds.empty() ? Json(nullptr) : Json(median(restored.milliseconds))}};
+}
+
+void print(const Json& report) {
+  const auto percent = [&](const char* key) {
+    return report[key].is_null() ? std::string("-") : fixed(100.0 * report[key].get<double>(), 1) + " %";
+  };
+  std::cout << "restored " << report["frames"] << " frames from " << report["frames_filled_from"]
+            << " of them\n"
+            << "removed: " << percent("hole_share") << " of the pictures; of that seen at other times "
+            << percent("reprojected_share_of_hole") << ", invented " << percent("invented_share_of_hole")
+            << "\n";
+  for (const auto& [reason, count] : report["left_out"].items())
+    std::cout << "left out " << count << ": " << reason << "\n";
+  if (!report["processor_milliseconds_a_frame"].is_null())
+    std::cout << "median " << fixed(report["processor_milliseconds_a_frame"].get<double>(), 0)
+              << " ms of processor time a frame with holes\n";
+  std::cout << "results: " << report["out"].get<std::string>() << "\n";
+}
+
+void restore(RestoreArguments arguments, const std::string& version) {
+  const InterruptWatcher interrupt;
+  arguments.flight.quiet |= arguments.json;
+  const RecordedRun run(run_folder_of(arguments, version, interrupt.token()));
+  StaticSceneRestorer restorer(run.camera(), settings_for(arguments, run.removal().options()),
+                               open_inpainter(arguments));
+  RestoredFolder folder(arguments.out, run.camera());
+  const Restored restored = restore_all(run, restorer, folder, arguments.flight.quiet, interrupt.token());
+  folder.close();
+  const Json report = report_of(arguments, run, folder, restored);
+  write_file(arguments.out / "restoration.json",
+             report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  if (folder.frames() == 0 && !restored.interrupted)
+    throw InputError(run.source() + ": no frame could be restored" + in_words(restored.left_out) +
+                     "; is it what the run flew?");
+  if (arguments.json) {
+    std::cout << report.dump(-1, ' ', false, Json::error_handler_t::replace) << "\n";
+  } else {
+    print(report);
+  }
+  require_written_output();
+}
+}  // namespace
+
+void add_restore_command(CLI::App& program, const std::string& version) {
+  const auto arguments = std::make_shared<RestoreArguments>();
+  CLI::App* command = program.add_subcommand(
+      "restore", "Write a sequence without the things that move in it: the static scene behind them");
+  command->footer(
+      "Examples:\n"
+      "  roslam restore rgbd_dataset_freiburg3_walking_xyz --camera tum-fr3 --out walking_static\n"
+      "  roslam run my_flight --camera my_camera.yaml --out run\n"
+      "  roslam restore run --out my_flight_static\n"
+      "SOURCE is what roslam run wrote, or something to fly through first, which leaves its run in DIR/run.\n"
+      "DIR then holds the sequence in the TUM format, for any other system:\n"
+      "  rgb/ rgb.txt depth/ depth.txt camera.yaml   named and timed as in the source\n"
+      "  provenance/        where each pixel comes from: 0 measured, 128 seen at another time, 255 invented\n"
+      "  before_after.jpg   as taken, restored, and restored with what was seen green and invented magenta\n"
+      "  restoration.json   what was done");
+  add_source_options(*command, arguments->flight.source)->required();
+  command->add_option("--out", arguments->out, "Folder the sequence is written to; made if it does not exist")
+      ->required();
+  command
+      ->add_option("--method", arguments->method,
+                   "both, or one alone to compare: reprojection (leaves black what nobody saw), gan, telea "
+                   "or navier-stokes (OpenCV's)")
+      ->check(CLI::IsMember({"both", "reprojection", "gan", "telea", "navier-stokes"}))
+      ->capture_default_str();
+  command->add_option(
+      "--models", arguments->models,
+      "Folder with roslam-restorer-person.onnx and so on, in place of those that come with the program");
+  command->add_option("--config", arguments->flight.config,
+                      "YAML file with options of the flight, where it is not flown yet");
+  add_flight_options(*command, arguments->flight.source);
+  command->add_flag("--quiet", arguments->flight.quiet, "No progress");
+  command->add_flag("--json", arguments->json, "Print the summary as one JSON object");
+  command->callback([arguments, version] { restore(*arguments, version); });
+}
+
+}  // namespace roslam::app

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/restored_folder.hpp"
+
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "apps/roslam/output.hpp"
+#include "roslam/error.hpp"
+#include "roslam/restoration/restoration_picture.hpp"
+#include "roslam/sources/image_file.hpp"
+#include "roslam/write_file.hpp"
+
+namespace roslam::app {
+
+namespace {
+namespace fs = std::filesystem;
+
+constexpr std::size_t kPictures = 6;  // of before and after; twice as many are kept until the end
+constexpr int kPictureWidth = 1200;   // pixels
+constexpr const char* kProvenance = "provenance";
+
+// A dataset must not be replaced by what was made of it, but an earlier result may.
+fs::path made(const fs::path& folder) {
+  make_folder(folder);
+  std::error_code error;
+  if (fs::exists(folder / "rgb.txt", error) && !fs::exists(folder / kProvenance, error))
+    throw OutputError(folder.string() +
+                      ": is a dataset, which the result would replace; choose another --out");
+  for (const char* name : {"rgb", "depth", kProvenance}) {
+    fs::remove_all(folder / name, error);
+    make_folder(folder / name);
+  }
+  return folder;
+}
+}  // namespace
+
+RestoredFolder::RestoredFolder(fs::path folder, const Camera& camera)
+    : folder_(made(folder)), camera_(camera), colours_(folder_ / "rgb.txt"), depths_(folder_ / "depth.txt") {
+  write_file(folder_ / "camera.yaml", camera_to_yaml(camera));
+  colours_.line("# timestamp filename");
+  depths_.line("# timestamp filename");
+}
+
+void RestoredFolder::add(const Frame& frame, const RestoredView& restored, const std::string& name) {
+  const std::string file = name + ".png";
+  const std::string time = stamp(frame.timestamp);
+  write_picture(folder_ / "rgb" / file, restored.colour);
+  write_picture(folder_ / kProvenance / file, restored.provenance);
+  colours_.line(time + " rgb/" + file);
+  if (!restored.depth.empty()) {
+    write_picture(folder_ / "depth" / file, packed_depth(restored.depth, camera_.depth_units_per_metre));
+    depths_.line(time + " depth/" + file);
+  }
+  ++frames_;
+  pixels_ += restored.colour.total();
+  reprojected_ += restored.pixels_of(Provenance::kReprojected);
+  invented_ += restored.pixels_of(Provenance::kInvented);
+  keep_picture(frame, restored);
+}
+
+// Frames spread over the sequence, however long it turns out to be.
+void RestoredFolder::keep_picture(const Frame& frame, const RestoredView& restored) {
+  if (restored.pixels_of(Provenance::kMeasured) == restored.colour.total()) return;
+  if (with_holes_++ % stride_ != 0) return;
+  cv::Mat picture = restoration_picture(frame.colour, restored);
+  const double scale = static_cast<double>(kPictureWidth) / picture.cols;
+  cv::resize(picture, picture, {}, scale, scale, cv::INTER_AREA);
+  pictures_.push_back(picture);
+  if (pictures_.size() < 2 * kPictures) return;
+  for (std::size_t i = 0; i < kPictures; ++i) pictures_[i] = pictures_[2 * i];
+  pictures_.resize(kPictures);
+  stride_ *= 2;
+}
+
+void RestoredFolder::close() {
+  colours_.close();
+  depths_.close();
+  if (pictures_.empty()) return;
+  std::vector<cv::Mat> chosen;
+  const std::size_t count = std::min(kPictures, pictures_.size());
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(pictures_[i * pictures_.size() / count]);
+  cv::Mat strip;
+  cv::vconcat(chosen, strip);
+  write_image(folder_ / "before_after.jpg", strip);
+}
+
+}  // namespace roslam::app

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/roslam/tum_writer.hpp"
+#include "roslam/geometry/camera.hpp"
+#include "roslam/restoration/static_scene_restorer.hpp"
+#include "roslam/sources/frame_source.hpp"
+
+namespace roslam::app {
+
+/// A sequence without its moving things in the TUM format, and beside it where each pixel comes from.
+class RestoredFolder {
+ public:
+  /// Throws OutputError if the folder cannot be made or is a dataset already that was not restored.
+  RestoredFolder(std::filesystem::path folder, const Camera& camera);
+
+  /// name: of the frame's files, without ending. Throws OutputError.
+  void add(const Frame& frame, const RestoredView& restored, const std::string& name);
+
+  /// Writes what is still held back and, if there are any, pictures of before and after. Throws OutputError.
+  void close();
+
+  std::size_t frames() const { return frames_; }
+
+  /// Pixels so far, by what became of them.
+  std::size_t measured() const { return pixels_ - reprojected_ - invented_; }
+  std::size_t reprojected() const { return reprojected_; }
+  std::size_t invented() const { return invented_; }
+
+ private:
+  void keep_picture(const Frame& frame, const RestoredView& restored);
+
+  std::filesystem::path folder_;
+  Camera camera_;
+  TextFile colours_, depths_;
+  std::size_t frames_ = 0;
+  std::size_t pixels_ = 0, reprojected_ = 0, invented_ = 0;
+  std::vector<cv::Mat> pictures_;
+  std::size_t with_holes_ = 0;
+  std::size_t stride_ = 1;  // every so many frames with holes one picture is kept
+};
+
+}  // namespace roslam::app

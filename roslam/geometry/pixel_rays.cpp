@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/geometry/pixel_rays.hpp"
+
+#include <limits>
+
+namespace roslam {
+
+namespace {
+constexpr double kDistortionTolerance = 0.5;  // pixels by which undoing distortion may miss
+constexpr float kNearest = 0.05F;             // metres
+}  // namespace
+
+PixelRays::PixelRays(const Camera& camera)
+    : camera_(camera),
+      rays_(camera.height, camera.width, CV_32FC2),
+      has_distortion_(camera.has_distortion()) {
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const Eigen::Vector2d pixel(x, y);
+      const Eigen::Vector2d undistorted = camera.undistort(pixel);
+      const Eigen::Vector3d ray = camera.unproject(undistorted, 1.0);
+      const bool is_known = (camera.distort(undistorted) - pixel).norm() < kDistortionTolerance;
+      rays_.at<cv::Vec2f>(y, x) = is_known
+                                      ? cv::Vec2f(static_cast<float>(ray.x()), static_cast<float>(ray.y()))
+                                      : cv::Vec2f::all(std::numeric_limits<float>::quiet_NaN());
+    }
+  }
+  const auto bounds = camera.undistorted_bounds();
+  low_ = camera.unproject({bounds[0], bounds[1]}, 1.0).head<2>().cast<float>();
+  high_ = camera.unproject({bounds[2], bounds[3]}, 1.0).head<2>().cast<float>();
+}
+
+std::optional<Eigen::Vector2f> PixelRays::pixel(const Eigen::Vector3f& point) const {
+  if (!(point.z() > kNearest)) return std::nullopt;
+  const Eigen::Vector2f ray = point.head<2>() / point.z();
+  // Far outside of the image the model of distortion may lead back into it.
+  if (!(ray.x() >= low_.x() && ray.y() >= low_.y() && ray.x() <= high_.x() && ray.y() <= high_.y()))
+    return std::nullopt;
+  const auto fx = static_cast<float>(camera_.fx), fy = static_cast<float>(camera_.fy);
+  Eigen::Vector2f pixel(fx * ray.x() + static_cast<float>(camera_.cx),
+                        fy * ray.y() + static_cast<float>(camera_.cy));
+  if (has_distortion_) pixel = camera_.distort(pixel.cast<double>()).cast<float>();
+  const bool is_inside = pixel.x() >= 0.0F && pixel.y() >= 0.0F &&
+                         pixel.x() <= static_cast<float>(rays_.cols - 1) &&
+                         pixel.y() <= static_cast<float>(rays_.rows - 1);
+  return is_inside ? std::optional(pixel) : std::nullopt;
+}
+
+}  // namespace roslam

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/restoration/inpainter.hpp"
+
+#include <opencv2/dnn.hpp>
+#include <string>
+
+#include "roslam/error.hpp"
+#include "roslam/shipped_file.hpp"
+
+namespace roslam {
+
+namespace {
+constexpr std::array kKinds{Movable::kPerson, Movable::kCar, Movable::kBicycle, Movable::kUnknown};
+
+std::string file_for(Movable kind) { return "roslam-restorer-" + std::string(name_of(kind)) + ".onnx"; }
+
+cv::Mat channel(cv::Mat& blob, int number) {
+  return {kCropSide, kCropSide, CV_32FC1, blob.ptr<float>(0, number)};
+}
+
+// RGB from 0 to 1, the hole and the square: 1 x 5 x 256 x 256.
+cv::Mat seen(const cv::Mat& crop, const cv::Mat& hole, const cv::Rect& square) {
+  const std::array sizes{1, 5, kCropSide, kCropSide};
+  cv::Mat blob(static_cast<int>(sizes.size()), sizes.data(), CV_32FC1, cv::Scalar(0));
+  for (int c = 0; c < 3; ++c) {
+    cv::Mat plane;
+    cv::extractChannel(crop, plane, 2 - c);
+    plane.convertTo(channel(blob, c), CV_32F, 1.0 / 255.0);
+  }
+  channel(blob, 3).setTo(1.0, hole);
+  channel(blob, 4)(square & cv::Rect(0, 0, kCropSide, kCropSide)).setTo(1.0);
+  return blob;
+}
+
+cv::Mat picture_of(cv::Mat painted) {
+  std::array<cv::Mat, 3> channels;
+  for (int c = 0; c < 3; ++c)
+    channel(painted, 2 - c).convertTo(channels[static_cast<std::size_t>(c)], CV_8U, 255.0);
+  cv::Mat picture;
+  cv::merge(channels, picture);
+  return picture;
+}
+
+bool is_picture(const cv::Mat& blob) {
+  return blob.dims == 4 && blob.size[0] == 1 && blob.size[1] == 3 && blob.size[2] == kCropSide &&
+         blob.size[3] == kCropSide;
+}
+}  // namespace
+
+GanInpainter::GanInpainter(const std::filesystem::path& folder, InferenceBackend backend) {
+  for (std::size_t i = 0; i < kKinds.size(); ++i) {
+    const auto file = folder / file_for(kKinds[i]);
+    networks_[i] = {file, load_inference(file, backend)};
+  }
+}
+
+cv::Mat GanInpainter::paint(const cv::Mat& crop, const cv::Mat& hole, const cv::Rect& square, Movable kind) {
+  CV_Assert(crop.type() == CV_8UC3 && crop.size() == cv::Size(kCropSide, kCropSide) &&
+            hole.size() == crop.size());
+  const Movable known = kind == Movable::kNone ? Movable::kUnknown : kind;
+  const Network& network = networks_.at(static_cast<std::size_t>(known) - 1);
+  const cv::Mat painted = network.inference->run(seen(crop, hole, square));
+  if (!is_picture(painted)) {
+    throw ModelError(network.file.string() +
+                     ": gives no picture of 256x256 pixels; install the model that belongs to this version");
+  }
+  return picture_of(painted);
+}
+
+std::filesystem::path shipped_restoration_models() {
+  std::filesystem::path folder;
+  for (const Movable kind : kKinds) {
+    const auto file = shipped_file(file_for(kind));
+    if (file.empty()) return {};
+    folder = file.parent_path();
+  }
+  return folder;
+}
+
+}  // namespace roslam

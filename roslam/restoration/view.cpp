@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/restoration/view.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include "roslam/sources/depth_filling.hpp"
+
+namespace roslam {
+
+namespace {
+// Nonzero where depth is known and no neighbour's differs by more than noise allows.
+cv::Mat measured(const cv::Mat& depth, const DepthOptions& options) {
+  const cv::Mat known = (depth >= options.min_depth) & (depth <= options.max_depth);  // false for NaN
+  cv::Mat nearest = depth.clone();
+  nearest.setTo(1e6, ~known);
+  cv::Mat farthest = depth.clone();
+  farthest.setTo(0, ~known);
+  cv::erode(nearest, nearest, cv::Mat());
+  cv::dilate(farthest, farthest, cv::Mat());
+  cv::Mat tolerance = farthest * options.edge_growth + options.edge_ratio;
+  return known & (farthest - nearest <= tolerance.mul(farthest));
+}
+}  // namespace
+
+std::array<cv::Mat, kGreyLevels> grey_levels(const cv::Mat& colour) {
+  std::array<cv::Mat, kGreyLevels> levels;
+  cv::Mat grey;
+  cv::cvtColor(colour, grey, cv::COLOR_BGR2GRAY);
+  for (cv::Mat& level : levels) {
+    cv::resize(grey, level, {}, 0.5, 0.5, cv::INTER_AREA);
+    grey = level;
+  }
+  return levels;
+}
+
+std::optional<SourceView> source_view(const View& view, const DepthOptions& options) {
+  if (!view.T_world_camera || view.depth.empty()) return std::nullopt;
+  SourceView source{view.timestamp, *view.T_world_camera, view.colour, {}, {}, {}, {}};
+  source.is_static = view.removed.empty() ? cv::Mat(view.colour.size(), CV_8UC1, cv::Scalar(255))
+                                          : cv::Mat(view.removed == 0);
+  source.is_measured = measured(view.depth, options) & source.is_static;
+  if (cv::countNonZero(source.is_measured) == 0) return std::nullopt;
+  cv::Mat sure = cv::Mat::zeros(view.depth.size(), CV_32FC1);
+  view.depth.copyTo(sure, source.is_measured);
+  source.depth = filled_depth(sure, view.colour);
+  source.depth.setTo(0, ~source.is_static);
+  source.grey = grey_levels(view.colour);
+  return source;
+}
+
+}  // namespace roslam

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/restoration/view_alignment.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "roslam/geometry/se3.hpp"
+#include "roslam/restoration/view_link.hpp"
+
+namespace roslam {
+
+namespace {
+constexpr int kStride = 5;           // pixels between points
+constexpr float kLeastSlope = 4.0F;  // grey levels a pixel of the first level
+constexpr std::size_t kMostPoints = 1500;
+constexpr std::size_t kFewestPoints = 60;
+constexpr int kIterations = 4;         // at each level
+constexpr float kNoise = 8.0F;         // grey levels
+constexpr double kPlaceSigma = 0.02;   // metres by which a tracked pose may be off ...
+constexpr double kTurnSigma = 0.01;    // ... and radians
+constexpr float kSameSurface = 0.06F;  // share of the depth by which both may differ
+
+// Brightness between pixels of a grey image and how it changes there; coordinates of that image.
+struct Sample {
+  float value, slope_x, slope_y;
+};
+
+bool sample(const cv::Mat& grey, float x, float y, Sample& result) {
+  const int left = static_cast<int>(x), top = static_cast<int>(y);
+  if (x < 0.0F || y < 0.0F || left + 1 >= grey.cols || top + 1 >= grey.rows) return false;
+  const auto* upper = grey.ptr<std::uint8_t>(top) + left;
+  const auto* lower = grey.ptr<std::uint8_t>(top + 1) + left;
+  const float fx = x - static_cast<float>(left), fy = y - static_cast<float>(top);
+  const float a = upper[0], b = upper[1], c = lower[0], d = lower[1];
+  result.slope_x = (1.0F - fy) * (b - a) + fy * (d - c);
+  result.slope_y = (1.0F - fx) * (c - a) + fx * (d - b);
+  result.value = (1.0F - fy) * ((1.0F - fx) * a + fx * b) + fy * ((1.0F - fx) * c + fx * d);
+  return true;
+}
+
+// Pixel centres of a level that is smaller by a factor.
+float at_level(float pixel, float factor) { return (pixel + 0.5F) / factor - 0.5F; }
+
+float factor_of(std::size_t level) { return static_cast<float>(2U << level); }
+}  // namespace
+
+// Normal equations of the difference of brightness.
+struct AlignmentPoints::Fit {
+  Matrix6d normal = Matrix6d::Zero();
+  Vector6d right = Vector6d::Zero();
+  double cost = 0.0;  // mean over the points that were seen
+  std::size_t seen = 0;
+};
+
+AlignmentPoints::AlignmentPoints(const PixelRays& rays, const View& target, const cv::Mat& free)
+    : rays_(rays) {
+  if (target.depth.empty()) return;
+  const auto grey = grey_levels(target.colour);
+  for (int y = kStride; y + kStride < target.depth.rows; y += kStride) {
+    for (int x = kStride; x + kStride < target.depth.cols; x += kStride) {
+      const float depth = target.depth.at<float>(y, x);
+      if (!(depth > 0.0F) || free.at<std::uint8_t>(y, x) == 0) continue;
+      Point point{rays.point(x, y, depth), {}};
+      Sample first{};
+      bool is_inside = true;
+      for (std::size_t level = 0; level < kGreyLevels; ++level) {
+        Sample at{};
+        is_inside &= sample(grey[level], at_level(static_cast<float>(x), factor_of(level)),
+                            at_level(static_cast<float>(y), factor_of(level)), at);
+        point.brightness[level] = at.value;
+        if (level == 0) first = at;
+      }
+      if (is_inside && std::abs(first.slope_x) + std::abs(first.slope_y) >= kLeastSlope)
+        points_.push_back(point);
+    }
+  }
+  const std::size_t stride = points_.size() / kMostPoints + 1;
+  for (std::size_t i = 0; i * stride < points_.size(); ++i) points_[i] = points_[i * stride];
+  points_.resize((points_.size() + stride - 1) / stride);
+}
+
+float AlignmentPoints::gain_of(const SourceView& source, const SE3& T_source_target) const {
+  const Motion motion(T_source_target);
+  std::vector<float> ratios;
+  for (const Point& p : points_) {
+    const auto pixel = rays_.pixel(motion * p.point);
+    Sample seen{};
+    const float factor = factor_of(kGreyLevels - 1);
+    if (pixel &&
+        sample(source.grey.back(), at_level(pixel->x(), factor), at_level(pixel->y(), factor), seen) &&
+        seen.value > 1.0F)
+      ratios.push_back(p.brightness.back() / seen.value);
+  }
+  if (ratios.size() < kFewestPoints) return 1.0F;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
+}
+
+AlignmentPoints::Fit AlignmentPoints::fit_of(const SourceView& source, const SE3& T_source_target,
+                                             std::size_t level, float gain) const {
+  const Motion motion(T_source_target);
+  const float factor = factor_of(level);
+  const float fx = static_cast<float>(rays_.camera().fx) / factor,
+              fy = static_cast<float>(rays_.camera().fy) / factor;
+  Eigen::Matrix<float, 6, 6> normal = Eigen::Matrix<float, 6, 6>::Zero();
+  Eigen::Matrix<float, 6, 1> right = Eigen::Matrix<float, 6, 1>::Zero();
+  Fit fit;
+  for (const Point& p : points_) {
+    const Eigen::Vector3f point = motion * p.point;
+    const auto pixel = rays_.pixel(point);
+    if (!pixel) continue;
+    const cv::Point nearest(static_cast<int>(pixel->x() + 0.5F), static_cast<int>(pixel->y() + 0.5F));
+    const float seen_depth = source.depth.at<float>(nearest);
+    if (!(seen_depth > 0.0F) || std::abs(seen_depth - point.z()) > kSameSurface * point.z()) continue;
+    Sample seen{};
+    if (!sample(source.grey[level], at_level(pixel->x(), factor), at_level(pixel->y(), factor), seen))
+      continue;
+    const float residual = gain * seen.value - p.brightness[level];
+    const float weight = 1.0F / (1.0F + residual * residual / (kNoise * kNoise));  // Cauchy
+    const float x = point.x(), y = point.y(), z = point.z();
+    const float slope_x = gain * seen.slope_x * fx / z, slope_y = gain * seen.slope_y * fy / z;
+    const float slope_z = -(slope_x * x + slope_y * y) / z;
+    Eigen::Matrix<float, 6, 1> jacobian;  // of translation and rotation: slope and point x slope
+    jacobian << slope_x, slope_y, slope_z, y * slope_z - z * slope_y, z * slope_x - x * slope_z,
+        x * slope_y - y * slope_x;
+    normal.selfadjointView<Eigen::Upper>().rankUpdate(jacobian, weight);
+    right += weight * residual * jacobian;
+    fit.cost += std::log1p(static_cast<double>(residual * residual / (kNoise * kNoise)));
+    ++fit.seen;
+  }
+  fit.normal =
+      Eigen::Matrix<float, 6, 6>(normal.selfadjointView<Eigen::Upper>()).cast<double>() / (kNoise * kNoise);
+  fit.right = right.cast<double>() / (kNoise * kNoise);
+  fit.cost /= static_cast<double>(std::max<std::size_t>(fit.seen, 1));
+  return fit;
+}
+
+SE3 AlignmentPoints::aligned(const SourceView& source, const SE3& T_source_target) const {
+  const float gain = gain_of(source, T_source_target);
+  const Fit before = fit_of(source, T_source_target, 0, gain);
+  if (before.seen < kFewestPoints) return T_source_target;
+  Vector6d prior;
+  prior << Eigen::Vector3d::Constant(1.0 / (kPlaceSigma * kPlaceSigma)),
+      Eigen::Vector3d::Constant(1.0 / (kTurnSigma * kTurnSigma));
+  SE3 T = T_source_target;
+  for (std::size_t level = kGreyLevels; level-- > 0;) {
+    for (int i = 0; i < kIterations; ++i) {
+      Fit fit = fit_of(source, T, level, gain);
+      if (fit.seen < kFewestPoints) return T_source_target;
+      const Vector6d moved = (T * T_source_target.inverse()).log();
+      fit.normal.diagonal() += prior;
+      fit.right += prior.cwiseProduct(moved);
+      T = SE3::exp(-fit.normal.ldlt().solve(fit.right)) * T;
+    }
+  }
+  const Fit after = fit_of(source, T, 0, gain);
+  const bool is_better = T.is_finite() && after.cost < before.cost && 2 * after.seen > before.seen;
+  return is_better ? T : T_source_target;
+}
+
+}  // namespace roslam
