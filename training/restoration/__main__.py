@@ -4,7 +4,7 @@ import argparse
 import sys
 
 from training.command_line import add_options, chosen, run
-from training.restoration import evaluation, samples, train
+from training.restoration import evaluation, export, samples, train
 from training.restoration.losses import LossOptions
 from training.segmentation import checkpoint
 
@@ -14,7 +14,7 @@ def run_train(arguments):
     options.validate()
     training = samples.TrainingSamples(arguments.data, options.seed, options.batch, options.crop)
     train.Trainer(training, samples.validation_samples(arguments.data), arguments.out, options,
-                  checkpoint.load_network(arguments.segmenter)).run()
+                  checkpoint.load_network(arguments.segmenter), arguments.start_from).run()
 
 
 def run_evaluate(arguments):
@@ -31,25 +31,39 @@ def run_evaluate(arguments):
                   f"({s['ssim_static']:.3f})  L1 {s['l1']:.1f} ({s['l1_static']:.1f}) grey levels")
 
 
+def run_export(arguments):
+    generator = train.load_generator(arguments.checkpoint)
+    export.export(generator, arguments.out)
+    if arguments.weights:
+        train.save_weights(arguments.weights, generator)
+
+
 def main():
     parser = argparse.ArgumentParser(prog="python3 -m training.restoration", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
 
-    def command(name, run, text):
+    def command(name, run, text, data=False):
         added = commands.add_parser(name, help=text, description=text)
         added.set_defaults(run=run)
-        added.add_argument("--data", required=True, help="folder with segmentation/, cutouts/ and backgrounds/")
+        if data:
+            added.add_argument("--data", required=True, help="folder with segmentation/, cutouts/ and backgrounds/")
         return added
 
-    added = command("train", run_train, "train a generator, or go on with a run that was stopped")
+    added = command("train", run_train, "train a generator, or go on with a run that was stopped", data=True)
     added.add_argument("--out", required=True, help="folder of the run: log.jsonl and last.pt; a run in it goes on")
     added.add_argument("--segmenter", default="models/roslam-pspnet.pt",
                        help="checkpoint of the segmentation network, whose features are compared")
+    added.add_argument("--start-from", help="checkpoint of the same variant whose weights a new run starts with")
     add_options(added, train.TrainingOptions)
     add_options(added, LossOptions)
 
-    added = command("evaluate", run_evaluate, "compare generators with OpenCV's methods on held-out streets")
+    added = command("evaluate", run_evaluate, "compare generators with OpenCV's methods on held-out streets", data=True)
     added.add_argument("--checkpoint", nargs="*", default=[], metavar="NAME=FILE")
+
+    added = command("export", run_export, "write a checkpoint as an ONNX file for each class and check them with OpenCV")
+    added.add_argument("--checkpoint", required=True)
+    added.add_argument("--out", required=True, help="folder of the files roslam-restorer-CLASS.onnx")
+    added.add_argument("--weights", help="also write the weights alone, in half precision, to start other runs from")
 
     return run(parser)
 

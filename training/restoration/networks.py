@@ -17,6 +17,7 @@ from torch.nn import functional
 SIZE_MULTIPLE = 8
 CLASSES = ("person", "car", "bicycle", "unknown")  # of eq. 12; each has an encoder of its own
 EPSILON = 1e-5  # of eq. 16
+EXPORT_BLOCK = 8  # pixels: what is exported takes means of blocks first, and sides that are multiples of 8 blocks
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,8 @@ def variants():
 
 
 def mean_of_image(x):
+    if torch.onnx.is_in_onnx_export():  # OpenCV adds one value after the other: so many that digits of the sum are lost
+        x = functional.avg_pool2d(x, EXPORT_BLOCK)
     return functional.adaptive_avg_pool2d(x, 1)
 
 

@@ -53,12 +53,17 @@ def load_generator(file):
                                    lambda options: networks.Generator(networks.GeneratorOptions(**options)))
 
 
+def save_weights(file, generator):
+    """A checkpoint that load_generator and --start-from read: the weights alone, in half precision."""
+    checkpoint.save_weights(file, generator, "generator_options")
+
+
 class Trainer(Loop):
     """Everything a run holds: made anew or from the checkpoint in its folder. training: a dataset as
     samples.TrainingSamples is, in batches of the options' size; validation: a list of samples.Sample; segmenter: a
     network of training.segmentation, whose features are compared."""
 
-    def __init__(self, training, validation, out, options, segmenter):
+    def __init__(self, training, validation, out, options, segmenter, start_from=None):
         options.validate()
         self.options, self.out = options, Path(out)
         self.processes = Processes()
@@ -78,11 +83,30 @@ class Trainer(Loop):
         self.step, self.stopped = 0, False
         if (self.out / "last.pt").exists():
             self.restore(checkpoint.load(self.out / "last.pt"))
+        elif start_from:
+            self.take_over(start_from)
+
+    def expect_variant(self, file, options, remedy):
+        if options != dataclasses.asdict(self.generator.options):
+            raise checkpoint.DataError(f"{file}: is of another variant than {self.options.variant}; {remedy}")
+
+    def take_over(self, file):
+        """Starts with the averaged weights of a checkpoint, and its discriminator if it holds one."""
+        generator = load_generator(file)
+        self.expect_variant(file, dataclasses.asdict(generator.options), "give the --variant that it is of")
+        self.generator.load_state_dict(generator.state_dict())
+        self.average = checkpoint.Average(self.generator, self.options.average)
+        discriminator = checkpoint.load(file).get("discriminator")
+        if discriminator:
+            try:
+                self.discriminator.load_state_dict(discriminator)
+            except RuntimeError as error:
+                raise checkpoint.DataError(f"{file}: its discriminator is of another version; start from its weights "
+                                           "alone (export --weights)") from error
+        self.log.write(event="weights taken over", of=str(file), discriminator=bool(discriminator))
 
     def restore(self, content):
-        if content.get("generator_options") != dataclasses.asdict(self.generator.options):
-            raise checkpoint.DataError(f"{self.out / 'last.pt'}: is of another variant than {self.options.variant}; give "
-                                       "another --out")
+        self.expect_variant(self.out / "last.pt", content.get("generator_options"), "give another --out")
         self.generator.load_state_dict(content["generator"])
         self.discriminator.load_state_dict(content["discriminator"])
         self.average.network.load_state_dict(content["average"])

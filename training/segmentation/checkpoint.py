@@ -55,10 +55,11 @@ def averaged(files):
     return result
 
 
-def save_weights(file, network):
-    """A checkpoint of the averaged weights alone, in half precision: what load_network and --start-from need."""
+def save_weights(file, network, key="network_options"):
+    """A checkpoint of the averaged weights alone, in half precision: what load_network, with the same key, and
+    --start-from need."""
     weights = {name: w.half() if w.is_floating_point() else w for name, w in network.state_dict().items()}
-    save(file, {"average": weights, "network_options": dataclasses.asdict(network.options)})
+    save(file, {"average": weights, key: dataclasses.asdict(network.options)})
 
 
 class Average:

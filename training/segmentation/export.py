@@ -15,7 +15,7 @@ from training.segmentation.evaluation import working_size
 from training.segmentation.networks import SIZE_MULTIPLE
 
 OPSET = 11  # the newest that OpenCV 4.6 reads in full
-TOLERANCE = 1e-3  # largest difference of scores between PyTorch and OpenCV, relative to the largest score
+TOLERANCE = 1e-3  # largest difference of values between PyTorch and OpenCV, relative to the largest value
 
 
 def folded(network):
@@ -37,12 +37,17 @@ def export(network, file, size=working_size(480, 640)):
     picture = torch.rand(1, 3, *size, generator=torch.Generator().manual_seed(1))
     temporary = file.with_suffix(".tmp")
     with torch.no_grad():
-        torch.onnx.export(network, picture, str(temporary), opset_version=OPSET, input_names=["image"],
-                          output_names=["scores"], **classic_exporter())
+        write(network, temporary, picture, "image", "scores")
         check(network, temporary, picture)
         if network.options.pyramid != "bins":
             check(network, temporary, picture[:, :, :SIZE_MULTIPLE * 2, :SIZE_MULTIPLE * 5])
     os.replace(temporary, file)
+
+
+def write(network, file, example, input_name, output_name):
+    """Writes what the network does with the example."""
+    torch.onnx.export(network, example, str(file), opset_version=OPSET, input_names=[input_name],
+                      output_names=[output_name], **classic_exporter())
 
 
 def classic_exporter():
@@ -50,10 +55,10 @@ def classic_exporter():
     return {"dynamo": False} if "dynamo" in inspect.signature(torch.onnx.export).parameters else {}
 
 
-def check(network, file, picture):
+def check(network, file, example):
     runner = cv2.dnn.readNetFromONNX(str(file))
-    runner.setInput(picture.numpy())
-    scores, expected = runner.forward(), network(picture).numpy()
-    difference = np.abs(scores - expected).max() / np.abs(expected).max()
+    runner.setInput(example.numpy())
+    found, expected = runner.forward(), network(example).numpy()
+    difference = np.abs(found - expected).max() / np.abs(expected).max()
     if not difference <= TOLERANCE:  # nor if the network gives no numbers
-        raise RuntimeError(f"{file}: OpenCV's scores differ from PyTorch's by {difference:.1e} of the largest")
+        raise RuntimeError(f"{file}: OpenCV's values differ from PyTorch's by {difference:.1e} of the largest")

@@ -6,6 +6,7 @@ import tempfile
 import unittest
 from contextlib import redirect_stdout
 from pathlib import Path
+from unittest import mock
 
 os.environ["CUDA_VISIBLE_DEVICES"] = ""  # a GPU adds in any order, and no two runs are alike
 
@@ -13,10 +14,13 @@ import cv2
 import numpy as np
 import torch
 
-from training.restoration import evaluation, losses, networks, silhouettes, train
+from training.restoration import __main__ as program
+from training.restoration import evaluation, export, losses, networks, silhouettes, train
 from training.restoration.samples import Sample
+from training.segmentation import checkpoint
 from training.segmentation import networks as segmentation_networks
 from training.segmentation.datasets import DataError
+from training.segmentation.export import write
 
 
 def person_shape(height=60, width=24):
@@ -106,29 +110,109 @@ class TheGenerator(unittest.TestCase):
                 pictures = [generator(image, hole, square, kind) for kind in range(len(networks.CLASSES))]
             self.assertEqual([not torch.equal(pictures[0], p) for p in pictures[1:]], [differs] * 3)
 
-    def test_every_variant_runs_in_opencv(self):
-        hole, square = map(as_tensor, hole_and_square())
-        seen = torch.cat([torch.rand(1, 3, 64, 64), hole, square], 1)
 
-        class Whole(torch.nn.Module):
-            def __init__(self, generator):
-                super().__init__()
-                self.generator = generator
+def random_generator(variant="roslam-restorer", **options):
+    """Small, with weights of which no two are equal: equal ones would be merged, which OpenCV cannot read."""
+    torch.manual_seed(1)
+    options = {"widths": (6, 8, 10), "dilations": (1, 2)} | options
+    generator = networks.Generator(dataclasses.replace(networks.variants()[variant], **options)).eval()
+    for parameter in generator.parameters():
+        torch.nn.init.normal_(parameter, mean=0.02, std=0.15)
+    return generator
 
-            def forward(self, x):
-                return self.generator(x[:, :3], x[:, 3:4], x[:, 4:5], 1)
 
+def checkpoint_of(generator):
+    return {"average": generator.state_dict(), "generator_options": dataclasses.asdict(generator.options)}
+
+
+def painted_by(file, seen):
+    runner = cv2.dnn.readNetFromONNX(str(file))
+    runner.setInput(seen.numpy(), "seen")
+    return runner.forward("painted")
+
+
+def files_in(folder):
+    return [Path(folder) / f"roslam-restorer-{name}.onnx" for name in networks.CLASSES]
+
+
+class Export(unittest.TestCase):
+    def seen(self, side=64):
+        """Not what the export checks itself with."""
+        hole, square = hole_and_square(side)
+        picture = torch.rand(1, 3, side, side, generator=torch.Generator().manual_seed(2))
+        return torch.cat([picture, as_tensor(hole), as_tensor(square)], 1)
+
+    def test_the_command_writes_a_network_for_each_class_and_the_weights(self):
+        generator = random_generator()
+        with tempfile.TemporaryDirectory() as folder:
+            folder = Path(folder)
+            checkpoint.save(folder / "last.pt", checkpoint_of(generator))
+            arguments = ["", "export", "--checkpoint", f"{folder}/last.pt", "--out", f"{folder}/onnx", "--weights",
+                         f"{folder}/weights.pt"]
+            with mock.patch("sys.argv", arguments):
+                self.assertEqual(program.main(), 0)
+            self.assertEqual(sorted((folder / "onnx").iterdir()), sorted(files_in(folder / "onnx")))
+            again, seen = train.load_generator(folder / "weights.pt"), self.seen(256)
+            with torch.no_grad():
+                expected = [again(seen[:, :3], seen[:, 3:4], seen[:, 4:], kind).numpy() for kind in range(4)]
+            for number, file in enumerate(files_in(folder / "onnx")):
+                np.testing.assert_allclose(painted_by(file, seen), expected[number], atol=1e-4, err_msg=file.name)
+                for other in expected[:number]:
+                    self.assertGreater(np.abs(expected[number] - other).max(), 0.01)
+            self.assertEqual(again.options, generator.options)
+            for name, weights in generator.state_dict().items():
+                self.assertTrue(torch.equal(again.state_dict()[name], weights.half().float()), name)
+
+    def test_every_variant_is_exported(self):
+        seen = self.seen()
         for name, options in networks.variants().items():
-            torch.manual_seed(1)
-            generator = networks.Generator(options).eval()
-            for parameter in generator.parameters():  # equal weights would be merged, which OpenCV cannot read
-                torch.nn.init.normal_(parameter, mean=0.02, std=0.05)
-            with tempfile.TemporaryDirectory() as folder, torch.no_grad():
-                file = str(Path(folder) / "generator.onnx")
-                torch.onnx.export(Whole(generator), seen, file, opset_version=11)
-                runner = cv2.dnn.readNetFromONNX(file)
-                runner.setInput(seen.numpy())
-                np.testing.assert_allclose(runner.forward(), Whole(generator)(seen).numpy(), atol=1e-3, err_msg=name)
+            generator = random_generator(name)
+            with tempfile.TemporaryDirectory() as folder:
+                export.export(generator, folder, 64)
+                found = [painted_by(file, seen) for file in files_in(folder)]
+            with torch.no_grad():
+                expected = generator(seen[:, :3], seen[:, 3:4], seen[:, 4:], 1).numpy()
+            np.testing.assert_allclose(found[1], expected, atol=0.02, err_msg=name)  # of weights that are not rounded
+            self.assertEqual([not np.array_equal(found[0], f) for f in found[1:]], [options.encoders == "class"] * 3)
+
+    def test_what_the_hole_hides_is_not_seen(self):
+        seen = self.seen()
+        inside = seen.clone()
+        inside[:, :3] = networks.composed(seen[:, :3], torch.rand(1, 3, 64, 64), seen[:, 3:4])
+        outside = seen.clone()
+        outside[:, :3] = networks.composed(seen[:, :3], torch.rand(1, 3, 64, 64), 1 - seen[:, 3:4])
+        with tempfile.TemporaryDirectory() as folder:
+            export.export(random_generator(), folder, 64)
+            for file in files_in(folder):
+                painted = painted_by(file, seen)
+                np.testing.assert_array_equal(painted_by(file, inside), painted)
+                self.assertGreater(np.abs(painted_by(file, outside) - painted).max(), 0.01)
+
+    def test_what_ships_is_small(self):
+        shipped = networks.GeneratorOptions()
+        with tempfile.TemporaryDirectory() as folder:
+            export.export(random_generator(widths=shipped.widths, dilations=shipped.dilations), folder, 64)
+            self.assertLess(sum(file.stat().st_size for file in files_in(folder)), 13e6)
+
+    def test_a_network_that_gives_no_numbers_leaves_no_file(self):
+        generator = random_generator()
+        with torch.no_grad():
+            generator.encoders[3].convolutions[0].bias.fill_(float("nan"))
+        with tempfile.TemporaryDirectory() as folder:
+            with self.assertRaisesRegex(RuntimeError, "unknown.onnx: .*differ"):
+                export.export(generator, folder, 64)
+            self.assertEqual(os.listdir(folder), [])
+
+    def test_means_of_large_pictures_keep_their_digits(self):
+        class Mean(torch.nn.Module):
+            def forward(self, x):
+                return networks.mean_of_image(x)
+
+        x = torch.rand(1, 8, 512, 512, generator=torch.Generator().manual_seed(1))
+        with tempfile.TemporaryDirectory() as folder:
+            write(Mean(), f"{folder}/mean.onnx", x, "seen", "painted")
+            difference = painted_by(f"{folder}/mean.onnx", x) - x.double().mean((2, 3), keepdim=True).numpy()
+        self.assertLess(np.abs(difference).max(), 2e-6)
 
 
 class Holes(unittest.TestCase):
@@ -234,33 +318,73 @@ class FewSamples(torch.utils.data.Dataset):
 
 
 class Training(unittest.TestCase):
-    def trained(self, folder, *steps):
-        options = train.TrainingOptions(steps=6, batch=2, crop=64, workers=0, warm_up=1, decay_share=0.0, adversary_from=2,
+    def trained(self, folder, *steps, **more):
+        for last in steps:
+            trainer = self.trainer(folder, steps=last, **more)
+            trainer.run()
+        return trainer
+
+    def trainer(self, folder, start_from=None, **more):
+        options = train.TrainingOptions(batch=2, crop=64, workers=0, warm_up=1, decay_share=0.0, adversary_from=2,
                                         precision="float")
         torch.manual_seed(5)
         segmenter = segmentation_networks.PSPNet(segmentation_networks.variants()["roslam-pspnet"])
-        for last in steps:
-            trainer = train.Trainer(FewSamples(), [], folder, dataclasses.replace(options, steps=last), segmenter)
-            trainer.run()
-        return trainer
+        return train.Trainer(FewSamples(), [], folder, dataclasses.replace(options, **more), segmenter, start_from)
+
+    def assert_same_weights(self, a, b):
+        for name, weights in a.state_dict().items():
+            self.assertTrue(torch.equal(weights, b.state_dict()[name]), name)
 
     def test_a_run_that_stops_goes_on_where_it_was(self):
         with tempfile.TemporaryDirectory() as a, tempfile.TemporaryDirectory() as b, redirect_stdout(io.StringIO()):
             straight, resumed = self.trained(a, 6), self.trained(b, 3, 6)
-            for name in ("generator", "discriminator"):
-                expected, found = (getattr(t, name).state_dict() for t in (straight, resumed))
-                for key, value in expected.items():
-                    self.assertTrue(torch.equal(value, found[key]), f"{name} {key}")
+            self.assert_same_weights(straight.generator, resumed.generator)
+            self.assert_same_weights(straight.discriminator, resumed.discriminator)
             generator = train.load_generator(Path(b) / "last.pt")
             self.assertEqual(generator.options, networks.GeneratorOptions())
 
     def test_a_checkpoint_of_another_variant_is_refused(self):
         with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()):
             self.trained(folder, 1)
-            options = train.TrainingOptions(variant="instance", crop=64)
-            segmenter = segmentation_networks.PSPNet(segmentation_networks.variants()["roslam-pspnet"])
             with self.assertRaisesRegex(DataError, "another variant"):
-                train.Trainer(FewSamples(), [], folder, options, segmenter)
+                self.trainer(folder, variant="instance")
+
+    def test_a_run_starts_from_the_averaged_weights_of_another(self):
+        with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()):
+            first = self.trained(f"{folder}/first", 4)
+            second = self.trainer(f"{folder}/second", f"{folder}/first/last.pt", seed=2)
+            self.assertEqual(second.step, 0)
+            self.assert_same_weights(first.average.network, second.generator)
+            self.assert_same_weights(first.average.network, second.average.network)
+            self.assert_same_weights(first.discriminator, second.discriminator)
+            second.save()
+            third = self.trainer(f"{folder}/second", f"{folder}/no such file")  # goes on with what the folder holds
+            self.assert_same_weights(third.generator, second.generator)
+
+    def test_a_run_starts_from_weights_alone(self):
+        with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()):
+            generator = networks.Generator()
+            train.save_weights(f"{folder}/weights.pt", generator)
+            plain = self.trainer(f"{folder}/plain")
+            started = self.trainer(f"{folder}/started", f"{folder}/weights.pt")
+            self.assert_same_weights(generator.half().float(), started.generator)
+            self.assert_same_weights(plain.discriminator, started.discriminator)
+
+    def test_what_does_not_fit_is_no_start(self):
+        with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()):
+            start = f"{folder}/start.pt"
+            train.save_weights(start, networks.Generator())
+            for variant in ("one-encoder", "instance"):
+                with self.assertRaisesRegex(DataError, f"start.pt: is of another variant than {variant}; give"):
+                    self.trainer(f"{folder}/{variant}", start, variant=variant)
+            strange = {"discriminator": {"layers": torch.zeros(1)}}
+            checkpoint.save(start, checkpoint_of(networks.Generator()) | strange)
+            with self.assertRaisesRegex(DataError, "start.pt: its discriminator is of another version; start"):
+                self.trainer(f"{folder}/strange", start)
+            segmenter = segmentation_networks.PSPNet(segmentation_networks.variants()["roslam-pspnet"])
+            checkpoint.save_weights(start, segmenter)
+            with self.assertRaisesRegex(DataError, "start.pt: holds no network of this version"):
+                self.trainer(f"{folder}/segmenter", start)
 
 
 if __name__ == "__main__":
