@@ -11,6 +11,7 @@ void add_benchmark_command(CLI::App& program, const std::string& version) {
   benchmark->require_subcommand(1);
   add_benchmark_static_command(*benchmark, version);
   add_benchmark_dynamic_command(*benchmark, version);
+  add_benchmark_restoration_command(*benchmark, version);
 }
 
 }  // namespace roslam::app

@@ -9,5 +9,6 @@ namespace roslam::app {
 // Each adds one kind of benchmark to `roslam benchmark`; a file of its own holds each.
 void add_benchmark_static_command(CLI::App& benchmark, const std::string& version);
 void add_benchmark_dynamic_command(CLI::App& benchmark, const std::string& version);
+void add_benchmark_restoration_command(CLI::App& benchmark, const std::string& version);
 
 }  // namespace roslam::app

@@ -7,8 +7,10 @@
 #include <optional>
 #include <utility>
 
+#include "apps/roslam/inpainter.hpp"
 #include "apps/roslam/output.hpp"
 #include "apps/roslam/progress.hpp"
+#include "apps/roslam/restored_folder.hpp"
 #include "roslam/atlas/map_file.hpp"
 #include "roslam/error.hpp"
 #include "roslam/pipeline/removal_log.hpp"
@@ -109,6 +111,13 @@ Flight fly(const FlightArguments& arguments, Options options, const std::string&
   flight.slam = std::make_unique<Slam>(flight.source->camera(), options, mode, segmenter,
                                        open_vocabulary(arguments, options));
   if (map) flight.slam->continue_from(std::move(*map));
+  std::optional<RestoredFolder> restored;
+  if (arguments.restore) {
+    restored.emplace(folder.path() / "restored", flight.source->camera());
+    flight.slam->restore_keyframes(open_inpainter(arguments.models), [&](const RestoredKeyframe& keyframe) {
+      restored->add(keyframe.frame, keyframe.view, stamp(keyframe.frame.timestamp));
+    });
+  }
   std::optional<RemovalLog> log;
   RemovalLog::remove_old(folder.path());
   if (options.removal.is_on())
@@ -121,6 +130,10 @@ Flight fly(const FlightArguments& arguments, Options options, const std::string&
     log_failure = std::current_exception();
   }
   if (log) flight.summary.removal = log->tally();
+  if (restored) {
+    restored->close();
+    flight.restored = restored->frames();
+  }
   folder.write(*flight.slam, flight.summary, *flight.source, flight.description);
   if (log_failure) std::rethrow_exception(log_failure);
   if (flight.summary.failure) std::rethrow_exception(flight.summary.failure);

@@ -26,7 +26,9 @@ struct FlightArguments {
   bool localise_only = false;
   std::string dynamic;  ///< empty: as the options say
   bool video = false;
-  bool quiet = false;  ///< no progress
+  bool restore = false;  ///< write the keyframes without what moves to the folder restored
+  std::string models;    ///< folder of the networks that paint, in place of the shipped ones
+  bool quiet = false;    ///< no progress
 };
 
 /// A flight that came to its end.
@@ -35,6 +37,7 @@ struct Flight {
   std::unique_ptr<Slam> slam;
   RunSummary summary;
   RunDescription description;
+  std::size_t restored = 0;  ///< keyframes
 };
 
 /// The options that the arguments ask for. Throws as read_options does.

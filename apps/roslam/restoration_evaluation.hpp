@@ -14,10 +14,11 @@ struct RestorationEvaluationSettings {
   std::filesystem::path truth;     ///< pictures without what moves
   std::filesystem::path estimate;  ///< restored pictures
   std::filesystem::path masks;     ///< images named as the restored ones, nonzero where they were restored;
-                                ///< empty: the provenance beside the restored ones
-  std::optional<double> truth_depth_units;  ///< a metre; nothing: as the camera.yaml beside the truth says
-  Segmenter* segmenter = nullptr;           ///< says what in the invented pixels may move; null: is not asked
-  std::size_t every = 1;                    ///< of the pictures, one in so many is compared
+                                   ///< empty: the provenance beside the restored ones
+  std::optional<double> truth_depth_units =
+      std::nullopt;                ///< a metre; nothing: as the camera.yaml beside the truth says
+  Segmenter* segmenter = nullptr;  ///< says what in the invented pixels may move; null: is not asked
+  std::size_t every = 1;           ///< of the pictures, one in so many is compared
   std::stop_token stop;
   bool quiet = false;
 };

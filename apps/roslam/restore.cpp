@@ -9,6 +9,7 @@
 
 #include "apps/roslam/commands.hpp"
 #include "apps/roslam/flight.hpp"
+#include "apps/roslam/inpainter.hpp"
 #include "apps/roslam/interrupt.hpp"
 #include "apps/roslam/output.hpp"
 #include "apps/roslam/progress.hpp"
@@ -35,6 +36,7 @@ struct RestoreArguments {
   fs::path out;
   fs::path models;
   std::string method = "both";
+  std::size_t every = 1;  // frame is restored
   bool json = false;
 };
 
@@ -51,21 +53,12 @@ std::string name_of_files(const FrameSource& source, const Frame& frame) {
   return recording ? recording->colour_file(frame.index).stem().string() : stamp(frame.timestamp);
 }
 
-std::shared_ptr<Inpainter> open_inpainter(const RestoreArguments& arguments) {
-  if (arguments.method != "both" && arguments.method != "gan") return nullptr;
-  const fs::path folder = arguments.models.empty() ? shipped_restoration_models() : arguments.models;
-  if (folder.empty()) {
-    std::cerr << "note: models/roslam-restorer-*.onnx: not found beside the program; what nobody saw is "
-                 "painted by a "
-                 "classic method. Install them or name their folder with --models\n";
-    return nullptr;
-  }
-  return std::make_shared<GanInpainter>(folder);
+std::shared_ptr<Inpainter> inpainter_for(const RestoreArguments& arguments) {
+  return arguments.method == "both" || arguments.method == "gan" ? open_inpainter(arguments.models) : nullptr;
 }
 
 StaticSceneRestorer::Settings settings_for(const RestoreArguments& arguments, const Options& options) {
-  StaticSceneRestorer::Settings settings;
-  settings.depth = options.depth;
+  StaticSceneRestorer::Settings settings = options.restorer_settings();
   settings.restoration.reproject = arguments.method == "both" || arguments.method == "reprojection";
   settings.restoration.invent = arguments.method != "reprojection";
   if (arguments.method == "navier-stokes") settings.invention.classic = ClassicMethod::kNavierStokes;
@@ -91,7 +84,7 @@ struct Restored {
 };
 
 Restored restore_all(const RecordedRun& run, StaticSceneRestorer& restorer, RestoredFolder& folder,
-                     bool quiet, const std::stop_token& stop) {
+                     std::size_t every, bool quiet, const std::stop_token& stop) {
   Restored restored;
   SequenceRestorer sequence(run, restorer);
   const auto first_pass = open_source_of(run);
@@ -109,6 +102,7 @@ Restored restore_all(const RecordedRun& run, StaticSceneRestorer& restorer, Rest
   while (!stop.stop_requested()) {
     const auto frame = second_pass->next();
     if (!frame) break;
+    if (frame->index % every != 0) continue;
     const Stopwatch watch;
     const auto view = sequence.restore(*frame);
     if (view) {
@@ -166,9 +160,10 @@ void restore(RestoreArguments arguments, const std::string& version) {
   arguments.flight.quiet |= arguments.json;
   const RecordedRun run(run_folder_of(arguments, version, interrupt.token()));
   StaticSceneRestorer restorer(run.camera(), settings_for(arguments, run.removal().options()),
-                               open_inpainter(arguments));
+                               inpainter_for(arguments));
   RestoredFolder folder(arguments.out, run.camera());
-  const Restored restored = restore_all(run, restorer, folder, arguments.flight.quiet, interrupt.token());
+  const Restored restored =
+      restore_all(run, restorer, folder, arguments.every, arguments.flight.quiet, interrupt.token());
   folder.close();
   const Json report = report_of(arguments, run, folder, restored);
   write_file(arguments.out / "restoration.json",
@@ -212,6 +207,11 @@ void add_restore_command(CLI::App& program, const std::string& version) {
   command->add_option(
       "--models", arguments->models,
       "Folder with roslam-restorer-person.onnx and so on, in place of those that come with the program");
+  command
+      ->add_option("--every", arguments->every,
+                   "Restore one frame in so many; others are filled from all the same")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   command->add_option("--config", arguments->flight.config,
                       "YAML file with options of the flight, where it is not flown yet");
   add_flight_options(*command, arguments->flight.source);

@@ -39,6 +39,12 @@ void print_map(const Slam& slam, bool has_map) {
               slam.map().landmark_count());
 }
 
+void print_restoration(const Flight& flight) {
+  std::printf("restored: %zu keyframes, %zu dropped\n", flight.restored, flight.slam->unrestored());
+  for (const auto& [fault, count] : flight.slam->restoration_faults())
+    std::printf("note: not restored: %s (%zu times)\n", fault.c_str(), count);
+}
+
 void print_summary(const Slam& slam, const RunSummary& summary, const std::string& folder, bool has_map) {
   const auto times = slam.times().summary();
   const std::size_t tracked = slam.trajectory().size();
@@ -93,6 +99,7 @@ void execute(RunArguments arguments, const std::string& version) {
     const auto report = run_report(*flight.slam, flight.summary, *flight.source, flight.description);
     std::cout << nlohmann::json::parse(report).dump() << "\n";
   } else {
+    if (arguments.flight.restore) print_restoration(flight);
     print_summary(*flight.slam, flight.summary, arguments.flight.out, !arguments.flight.map.empty());
   }
   require_written_output();
@@ -150,6 +157,13 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command->add_flag("--print-config", arguments->print_config, "Print the effective options and stop");
   command->add_flag("--video", arguments->flight.video,
                     "Write removal.avi too: each frame with what was kept and what was removed");
+  command->add_flag(
+      "--restore", arguments->flight.restore,
+      "Fill what the removal leaves open in each keyframe, from those before it and by a network, and write "
+      "them to RUN/restored; roslam restore does more, afterwards, with all frames");
+  command->add_option(
+      "--models", arguments->flight.models,
+      "Folder of the networks that --restore paints with, in place of those that come with the program");
   command->add_flag("--quiet", arguments->flight.quiet, "No progress");
   command->add_flag("--json", arguments->json, "Print the report as one JSON object");
   command->callback([arguments, version] { execute(*arguments, version); });

@@ -33,6 +33,10 @@ void Options::validate() const {
   place_check.validate();
   loop_closer.validate();
   pose_graph.validate();
+  restoration.validate();
+  reprojection.validate();
+  invention.validate();
+  depth_completion.validate();
   threads.validate();
 }
 
@@ -41,6 +45,10 @@ Tracker::Settings Options::tracker_settings() const {
 }
 
 DynamicRemoval::Settings Options::removal_settings() const { return {removal, depth, noise, pose}; }
+
+StaticSceneRestorer::Settings Options::restorer_settings() const {
+  return {restoration, reprojection, invention, depth_completion, depth};
+}
 
 LocalMapper::Settings Options::mapper_settings() const {
   return {landmarks, fusion, culling, bundle, matcher, noise};

@@ -10,6 +10,7 @@
 #include "roslam/loop/loop_closer.hpp"
 #include "roslam/mapping/local_mapper.hpp"
 #include "roslam/removal/dynamic_removal.hpp"
+#include "roslam/restoration/static_scene_restorer.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
 #include "roslam/tracking/keyframe_policy.hpp"
 #include "roslam/tracking/tracker.hpp"
@@ -52,6 +53,10 @@ struct Options {
   PlaceCheckOptions place_check;
   LoopCloserOptions loop_closer;
   PoseGraphOptions pose_graph;
+  RestorationOptions restoration;
+  ReprojectionOptions reprojection;
+  InventionOptions invention;
+  DepthCompletionOptions depth_completion;
   ThreadOptions threads;
 
   /// Throws OptionsError naming the first field out of range.
@@ -61,6 +66,7 @@ struct Options {
   LocalMapper::Settings mapper_settings() const;
   LoopCloser::Settings loop_settings() const;
   DynamicRemoval::Settings removal_settings() const;
+  StaticSceneRestorer::Settings restorer_settings() const;
 };
 
 /// Reads a configuration file (YAML); what it does not name keeps its default. Throws InputError for a file

@@ -156,6 +156,9 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   json["error"] = failure_json(summary.failure);
   json["frames"] = frames_json(slam, summary, source);
   json["dynamic"] = dynamic_json(slam, summary, description);
+  if (slam.restores())
+    json["restoration"] = {{"dropped", slam.unrestored()},
+                           {"faults", counts_json(slam.restoration_faults())}};
   json["loops"] = loops_json(slam);
   json["map"] = map_json(slam, description);
   json["keyframes"] = slam.map().keyframe_count();

@@ -9,19 +9,12 @@
 
 namespace roslam {
 
-void SequenceRestorerOptions::validate() const {
-  if (margin < 0 || margin > 200) throw OptionsError("margin must be 0 to 200 pixels");
-  if (!(source_interval > 0.0 && std::isfinite(source_interval)))
-    throw OptionsError("source_interval must be above 0 seconds");
-  if (max_sources < 1) throw OptionsError("max_sources must be at least 1");
-}
-
 namespace {
 // Files hold times with six decimals.
 long long microseconds(double timestamp) { return std::llround(1e6 * timestamp); }
 
 // Keyframes, and between them what leaves no longer gap than the interval; thinned if they are too many.
-std::set<long long> times_of_sources(const RecordedRun& run, const SequenceRestorerOptions& options) {
+std::set<long long> times_of_sources(const RecordedRun& run, const RestorationOptions& options) {
   std::set<long long> keyframes;
   for (const StampedPose& pose : run.keyframes()) keyframes.insert(microseconds(pose.timestamp));
   std::vector<double> times;
@@ -37,12 +30,11 @@ std::set<long long> times_of_sources(const RecordedRun& run, const SequenceResto
 }
 }  // namespace
 
-SequenceRestorer::SequenceRestorer(const RecordedRun& run, StaticSceneRestorer& restorer,
-                                   const SequenceRestorerOptions& options)
-    : run_(run), restorer_(restorer), options_(options) {
-  options.validate();
-  source_times_ = times_of_sources(run, options);
-}
+SequenceRestorer::SequenceRestorer(const RecordedRun& run, StaticSceneRestorer& restorer)
+    : run_(run),
+      restorer_(restorer),
+      options_(restorer.settings().restoration),
+      source_times_(times_of_sources(run, options_)) {}
 
 bool SequenceRestorer::is_source(double timestamp) const {
   return source_times_.contains(microseconds(timestamp));

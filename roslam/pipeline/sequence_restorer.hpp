@@ -15,21 +15,11 @@
 
 namespace roslam {
 
-struct SequenceRestorerOptions {
-  int margin = 8;                ///< pixels by which what was removed is dilated: outlines are blurred
-  double source_interval = 0.5;  ///< seconds; beside keyframes, a frame is kept to fill others from as often
-  int max_sources = 200;         ///< frames kept; of more, which take 2.5 MB each at 640x480, every n-th
-
-  /// Throws OptionsError naming the field.
-  void validate() const;
-};
-
 /// Restores the frames of a recorded run, from all of it: from what the camera saw before and after.
 class SequenceRestorer {
  public:
-  /// Throws OptionsError. run and restorer must outlive it.
-  SequenceRestorer(const RecordedRun& run, StaticSceneRestorer& restorer,
-                   const SequenceRestorerOptions& options = {});
+  /// run and restorer must outlive it.
+  SequenceRestorer(const RecordedRun& run, StaticSceneRestorer& restorer);
 
   /// Whether the frame of that time is one to fill others from.
   bool is_source(double timestamp) const;
@@ -50,7 +40,7 @@ class SequenceRestorer {
 
   const RecordedRun& run_;
   StaticSceneRestorer& restorer_;
-  SequenceRestorerOptions options_;
+  RestorationOptions options_;
   std::set<long long> source_times_;  // microseconds
   std::vector<std::unique_ptr<const SourceView>> sources_;
   std::map<std::string, std::size_t> left_out_;

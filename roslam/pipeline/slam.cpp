@@ -65,6 +65,18 @@ void Slam::continue_from(SavedMap saved) {
   map_.begin_flight();
 }
 
+void Slam::restore_keyframes(std::shared_ptr<Inpainter> inpainter,
+                             RestorationWorker::OnRestored on_restored) {
+  restoration_.emplace(
+      camera_, options_, mode_, std::move(inpainter),
+      [this](KeyframeId keyframe) { return place_of(keyframe); }, std::move(on_restored));
+}
+
+RestorationWorker::Placed Slam::place_of(KeyframeId keyframe) {
+  const std::scoped_lock lock(map_mutex_);
+  return {map_.world_of(keyframe), map_.T_camera_world(keyframe).inverse()};
+}
+
 void Slam::map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,
                         StageTimes& times) {
   // The next keyframe matters more than the last step of refining this one.
@@ -162,6 +174,7 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
   const double seconds = watch.seconds();
   note_times(removal_seconds, extract_seconds, seconds);
   if (keyframe.is_valid()) mapping_.submit(keyframe);
+  if (keyframe.is_valid() && restoration_) restoration_->submit(keyframe, frame, result.removal);
 
   result.index = frame.index;
   result.timestamp = frame.timestamp;
@@ -290,15 +303,18 @@ void Slam::note_times(double removal, double extract, double total) {
 }
 
 void Slam::finish() {
-  // Both, whatever the first throws: nobody may change the map any more when results are read.
+  // All, whatever the first throws: nobody may change the map any more when results are read.
   std::exception_ptr failure;
-  for (KeyframeWorker* worker : {&mapping_, &closing_}) {
+  const auto drain = [&](auto& worker) {
     try {
-      worker->drain();
+      worker.drain();
     } catch (...) {
       if (!failure) failure = std::current_exception();
     }
-  }
+  };
+  drain(mapping_);
+  drain(closing_);
+  if (restoration_) drain(*restoration_);
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -18,6 +18,7 @@
 #include "roslam/mapping/local_mapper.hpp"
 #include "roslam/pipeline/keyframe_worker.hpp"
 #include "roslam/pipeline/options.hpp"
+#include "roslam/pipeline/restoration_worker.hpp"
 #include "roslam/pipeline/segmentation_worker.hpp"
 #include "roslam/pipeline/statistics.hpp"
 #include "roslam/removal/dynamic_removal.hpp"
@@ -55,6 +56,15 @@ class Slam {
   /// Goes on from a map of an earlier flight: the camera is searched for in it. Call before the first frame.
   /// Throws InputError if the map was made with another camera or other pyramid levels.
   void continue_from(SavedMap saved);
+
+  /// Restores each keyframe from now on and hands it out, in real-time mode on another thread. inpainter:
+  /// paints what nobody saw, null: a classic method does. Call before the first frame.
+  void restore_keyframes(std::shared_ptr<Inpainter> inpainter, RestorationWorker::OnRestored on_restored);
+
+  /// Keyframes that there was no time to restore, and what went wrong with others, in words.
+  bool restores() const { return restoration_.has_value(); }
+  std::size_t unrestored() const { return restoration_ ? restoration_->dropped() : 0; }
+  std::map<std::string, std::size_t> restoration_faults() const;
 
   /// A copy of the map, for save_map. In real-time mode only after finish().
   SavedMap snapshot() const;
@@ -118,6 +128,7 @@ class Slam {
   void map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   void close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   std::vector<KeyframeId> similar_keyframes(const ObservedFrame& view) const;
+  RestorationWorker::Placed place_of(KeyframeId keyframe);
   void follow_correction();
   void follow_world(const TrackedFrame& frame);
   std::map<WorldId, std::size_t> frames_by_world() const;
@@ -156,6 +167,7 @@ class Slam {
   std::size_t followed_corrections_ = 0;
   KeyframeId last_reference_;  // of the last frame that was tracked
   // Last, so that their threads stop before what they use goes away.
+  std::optional<RestorationWorker> restoration_;
   KeyframeWorker closing_;
   KeyframeWorker mapping_;
 };

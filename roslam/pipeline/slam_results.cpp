@@ -21,6 +21,10 @@ std::map<std::string, std::size_t> Slam::labelling_faults() const {
   return faults;
 }
 
+std::map<std::string, std::size_t> Slam::restoration_faults() const {
+  return restoration_ ? restoration_->faults() : std::map<std::string, std::size_t>{};
+}
+
 std::map<WorldId, std::size_t> Slam::frames_by_world() const {
   std::map<WorldId, std::size_t> frames;
   for (const auto& record : records_) {
@@ -81,6 +85,7 @@ StageTimes Slam::times() const {
   all.add_all(mapping_.times());
   all.add_all(closing_.times());
   all.add_all(segmentation_.times());
+  if (restoration_) all.add_all(restoration_->times());
   return all;
 }
 

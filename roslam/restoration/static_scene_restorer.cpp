@@ -50,8 +50,16 @@ RestoredView begun(const View& target, const cv::Mat& hole) {
 }  // namespace
 
 void RestorationOptions::validate() const {
-  if (!(min_certainty >= 0.0 && min_certainty <= 1.0))
-    throw OptionsError("restoration.min_certainty must be 0 to 1");
+  const auto require = [](bool condition, const char* message) {
+    if (!condition) throw OptionsError(std::string("restoration.") + message);
+  };
+  require(min_certainty >= 0.0 && min_certainty <= 1.0, "min_certainty must be 0 to 1");
+  require(margin >= 0 && margin <= 200, "margin must be 0 to 200 pixels");
+  require(source_interval > 0.0 && source_interval <= 3600.0,
+          "source_interval must be above 0 and at most 3600 seconds");
+  require(max_sources >= 1 && max_sources <= 10000, "max_sources must be 1 to 10000");
+  require(recent_sources >= 1 && recent_sources <= 10000, "recent_sources must be 1 to 10000");
+  require(queue >= 1 && queue <= 1000, "queue must be 1 to 1000");
 }
 
 std::size_t RestoredView::pixels_of(Provenance from) const {

@@ -27,6 +27,14 @@ struct RestorationOptions {
   bool reproject = true;        ///< fill from other views
   bool invent = true;           ///< paint the rest; false: it is left black and without depth
   double min_certainty = 0.02;  ///< of a reprojected pixel, 0 to 1; what is less sure is painted
+  int margin = 8;               ///< pixels by which what was removed is dilated: outlines are blurred
+
+  // Which frames others are filled from; each takes 2.5 MB at 640x480.
+  double source_interval = 0.5;  ///< seconds; of a recorded run, beside keyframes, a frame as often
+  int max_sources = 200;         ///< of a recorded run; of more every n-th is used
+  int recent_sources = 40;       ///< keyframes, in flight the newest
+
+  int queue = 4;  ///< keyframes that may wait to be restored in flight; older ones are dropped
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -65,6 +73,8 @@ class StaticSceneRestorer {
   /// images do not fit the camera or each other, ModelError if the network fails.
   RestoredView restore(const View& target, const std::vector<RemovedRegion>& regions,
                        std::span<const SourceView* const> sources);
+
+  const Settings& settings() const { return settings_; }
 
   /// As roslam::source_view, with this restorer's depth limits.
   std::optional<SourceView> source_view(const View& view) const;

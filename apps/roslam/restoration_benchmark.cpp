@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/restoration_benchmark.hpp"
+
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "apps/roslam/child_process.hpp"
+#include "apps/roslam/output.hpp"
+#include "apps/roslam/removal_truth.hpp"
+#include "apps/roslam/restoration_evaluation.hpp"
+#include "apps/roslam/restoration_pictures.hpp"
+#include "roslam/error.hpp"
+#include "roslam/semantics/pspnet_segmenter.hpp"
+#include "roslam/sources/image_file.hpp"
+#include "roslam/write_file.hpp"
+
+namespace roslam::app {
+
+namespace {
+namespace fs = std::filesystem;
+
+constexpr std::size_t kPictures = 4;  // rows of the figure
+constexpr int kPictureWidth = 320;    // pixels
+
+class Measurement {
+ public:
+  Measurement(const BenchmarkSequence& sequence, const RestorationBenchmarkSettings& settings,
+              const std::stop_token& stop)
+      : sequence_(sequence), settings_(settings), stop_(stop), out_(settings.common.out) {}
+
+  RestoredSequence measure() {
+    RestoredSequence result{sequence_, {}, "", ""};
+    try {
+      if (sequence_.is_simulated()) render();
+      call(
+          {"run", sequence_.source, "--camera", sequence_.camera, "--out", folder("run").string(), "--quiet"},
+          "run");
+      for (const auto& method : settings_.methods) result.results.push_back(measure_method(method));
+      result.figure = draw();
+    } catch (const InputError& error) {
+      if (!stop_.stop_requested()) result.failure = error.what();
+    }
+    return result;
+  }
+
+ private:
+  fs::path folder(const std::string& part) const { return out_ / "runs" / (sequence_.name + "-" + part); }
+
+  void call(const std::vector<std::string>& arguments, const std::string& part) {
+    if (!settings_.common.quiet) std::fprintf(stderr, "%s: %s\n", sequence_.name.c_str(), part.c_str());
+    make_folder(out_ / "runs");
+    const fs::path log = out_ / "runs" / (sequence_.name + "-" + part + ".stderr.txt");
+    const auto ended = run_this_program(arguments, log, stop_);
+    if (stop_.stop_requested()) throw InputError("interrupted");
+    if (ended.code != 0) throw InputError(part + " failed: " + ended.last_words);
+  }
+
+  // A flight becomes a recording whose background is known.
+  void render() {
+    const auto& flight = settings_.common.settings;
+    const fs::path rendered = folder("rendered");
+    std::vector<std::string> arguments{"simulate",  sequence_.source.substr(sequence_.source.find(':') + 1),
+                                       "--out",     rendered.string(),
+                                       "--traffic", flight.traffic,
+                                       "--seed",    std::to_string(flight.seed)};
+    if (flight.frames > 0) arguments.insert(arguments.end(), {"--frames", std::to_string(flight.frames)});
+    call(arguments, "simulate");
+    sequence_.source = rendered.string();
+    sequence_.camera = (rendered / "camera.yaml").string();
+  }
+
+  RestorationResult measure_method(const std::string& method) {
+    const fs::path restored = folder(method);
+    call({"restore", folder("run").string(), "--method", method, "--every", std::to_string(settings_.every),
+          "--out", restored.string(), "--quiet"},
+         method);
+    const auto report = nlohmann::json::parse(std::ifstream(restored / "restoration.json"));
+    const auto& time = report.at("processor_milliseconds_a_frame");
+    RestorationResult result{method, evaluate(restored, {}), std::nullopt,
+                             time.is_null() ? std::numeric_limits<double>::quiet_NaN() : time.get<double>()};
+    if (write_actor_masks(restored)) result.behind = evaluate(restored, folder("actors"));
+    return result;
+  }
+
+  fs::path truth() const {
+    return settings_.truth.empty() ? fs::path(sequence_.source) : fs::path(settings_.truth);
+  }
+
+  RestorationError evaluate(const fs::path& restored, const fs::path& masks) {
+    RestorationEvaluationSettings evaluation;
+    evaluation.truth = truth();
+    evaluation.estimate = restored;
+    evaluation.masks = masks;
+    evaluation.truth_depth_units = settings_.depth_units;
+    if (!segmenter_ && !shipped_segmentation_model().empty())
+      segmenter_ = std::make_unique<PspnetSegmenter>(shipped_segmentation_model());
+    evaluation.segmenter = segmenter_.get();
+    evaluation.stop = stop_;
+    evaluation.quiet = true;
+    RestorationError error = evaluate_restoration(evaluation);
+    if (stop_.stop_requested()) throw InputError("interrupted");
+    return error;
+  }
+
+  // What the actors really hide of what was restored, once for all methods. False if that is not known.
+  bool write_actor_masks(const fs::path& restored) {
+    if (has_actor_masks_) return *has_actor_masks_;
+    const auto truth = open_removal_truth({sequence_.source, sequence_.camera});
+    has_actor_masks_ = truth != nullptr;
+    if (!truth) return false;
+    make_folder(folder("actors"));
+    std::map<double, std::string> names;
+    for (const auto& picture : pictures_of(restored)) names[*picture.timestamp] = picture.name + ".png";
+    while (const auto frame = truth->next()) {
+      const auto name = names.find(frame->timestamp);
+      if (name == names.end() || !frame->truth) continue;
+      const cv::Mat provenance = read_label_image(restored / "provenance" / name->second).image;
+      cv::Mat hidden = frame->truth->actors & (provenance != 0);
+      write_picture(folder("actors") / name->second, hidden);
+    }
+    return true;
+  }
+
+  // Frames spread over the sequence: as taken, the truth, and what each method made of it.
+  std::string draw() const {
+    const auto taken = pictures_of(sequence_.source);
+    const auto background = background_of(truth());
+    std::vector<fs::path> restored;
+    for (const auto& method : settings_.methods) restored.push_back(folder(method));
+    const auto pictures = pictures_of(restored.front());
+    std::vector<cv::Mat> rows;
+    for (std::size_t i = 0; i < kPictures; ++i) {
+      const auto& picture = pictures[(2 * i + 1) * pictures.size() / (2 * kPictures)];
+      std::vector<cv::Mat> row{picture_at(taken, *picture.timestamp),
+                               picture_at(background, *picture.timestamp)};
+      for (const auto& of_method : restored)
+        row.push_back(read_colour_image(of_method / "rgb" / picture.colour.filename()).image);
+      for (cv::Mat& cell : row) {
+        if (cell.empty()) return "";
+        cv::resize(cell, cell, {kPictureWidth, kPictureWidth * cell.rows / cell.cols}, 0, 0, cv::INTER_AREA);
+      }
+      rows.emplace_back();
+      cv::hconcat(row, rows.back());
+    }
+    cv::Mat figure;
+    cv::vconcat(rows, figure);
+    const std::string name = sequence_.name + ".jpg";
+    write_image(out_ / name, figure);
+    return name;
+  }
+
+  static cv::Mat picture_at(const std::vector<SequencePicture>& pictures, double timestamp) {
+    for (const auto& picture : pictures)
+      if (picture.timestamp && std::abs(*picture.timestamp - timestamp) < 1e-5)
+        return read_colour_image(picture.colour).image;
+    return {};
+  }
+
+  BenchmarkSequence sequence_;
+  const RestorationBenchmarkSettings& settings_;
+  std::stop_token stop_;
+  fs::path out_;
+  std::unique_ptr<Segmenter> segmenter_;
+  std::optional<bool> has_actor_masks_;
+};
+}  // namespace
+
+RestoredSequence measure_restoration(const BenchmarkSequence& sequence,
+                                     const RestorationBenchmarkSettings& settings,
+                                     const std::stop_token& stop) {
+  return Measurement(sequence, settings, stop).measure();
+}
+
+}  // namespace roslam::app

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/pipeline/restoration_worker.hpp"
+
+#include <exception>
+#include <utility>
+
+#include "roslam/geometry/stopwatch.hpp"
+#include "roslam/pipeline/thread_priority.hpp"
+#include "roslam/removal/mask_refinement.hpp"
+
+namespace roslam {
+
+namespace {
+cv::Mat removed_from(const Frame& frame, const Removal& removal, int margin) {
+  if (removal.objects.empty()) return {};
+  cv::Mat mask = cv::Mat::zeros(frame.colour.size(), CV_8UC1);
+  for (const MovableObject& object : removal.objects) paint(object, mask);
+  return dilated(mask, margin);
+}
+}  // namespace
+
+RestorationWorker::RestorationWorker(const Camera& camera, const Options& options, Mode mode,
+                                     std::shared_ptr<Inpainter> inpainter, PlaceOf place_of,
+                                     OnRestored on_restored)
+    : options_(options.restoration),
+      mode_(mode),
+      restorer_(camera, options.restorer_settings(), std::move(inpainter)),
+      place_of_(std::move(place_of)),
+      on_restored_(std::move(on_restored)),
+      worker_([this](KeyframeId keyframe, const auto&, StageTimes& times) { work(keyframe, times); }, mode,
+              1) {}
+
+void RestorationWorker::submit(KeyframeId keyframe, const Frame& frame, const Removal& removal) {
+  {
+    const std::scoped_lock lock(mutex_);
+    waiting_.emplace(keyframe, Job{frame, removal});
+    for (; waiting_.size() > static_cast<std::size_t>(options_.queue); ++dropped_)
+      waiting_.erase(waiting_.begin());
+  }
+  worker_.submit(keyframe);
+}
+
+std::size_t RestorationWorker::dropped() const {
+  const std::scoped_lock lock(mutex_);
+  return dropped_;
+}
+
+std::map<std::string, std::size_t> RestorationWorker::faults() const {
+  const std::scoped_lock lock(mutex_);
+  return faults_;
+}
+
+void RestorationWorker::work(KeyframeId keyframe, StageTimes& times) {
+  if (mode_ == Mode::kRealTime) give_way_to_others();
+  Job job;
+  {
+    const std::scoped_lock lock(mutex_);
+    const auto found = waiting_.find(keyframe);
+    if (found == waiting_.end()) return;  // dropped
+    job = std::move(found->second);
+    waiting_.erase(found);
+  }
+  try {
+    const Stopwatch watch;
+    restore(keyframe, job);
+    times.add("restoration", watch.seconds());
+  } catch (const std::exception& error) {
+    const std::scoped_lock lock(mutex_);
+    ++faults_[error.what()];
+  }
+}
+
+void RestorationWorker::restore(KeyframeId keyframe, const Job& job) {
+  const Placed placed = place_of_(keyframe);
+  const View view{job.frame.timestamp, placed.T_world_camera, job.frame.colour, job.frame.depth,
+                  removed_from(job.frame, job.removal, options_.margin)};
+  on_restored_({keyframe, job.frame, placed.T_world_camera, placed.world,
+                restorer_.restore(view, regions_of(job.removal.objects), sources_in(placed.world))});
+  if (auto source = restorer_.source_view(view)) sources_.insert_or_assign(keyframe, std::move(*source));
+  while (sources_.size() > static_cast<std::size_t>(options_.recent_sources))
+    sources_.erase(sources_.begin());
+}
+
+// Those before, where they are by now.
+std::vector<const SourceView*> RestorationWorker::sources_in(WorldId world) {
+  std::vector<const SourceView*> result;
+  for (auto& [keyframe, source] : sources_) {
+    const Placed placed = place_of_(keyframe);
+    if (placed.world != world) continue;
+    source.T_world_camera = placed.T_world_camera;
+    result.push_back(&source);
+  }
+  return result;
+}
+
+}  // namespace roslam

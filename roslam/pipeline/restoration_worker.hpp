@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "roslam/map/ids.hpp"
+#include "roslam/pipeline/keyframe_worker.hpp"
+#include "roslam/pipeline/options.hpp"
+#include "roslam/pipeline/statistics.hpp"
+#include "roslam/removal/dynamic_removal.hpp"
+#include "roslam/restoration/static_scene_restorer.hpp"
+#include "roslam/sources/frame_source.hpp"
+
+namespace roslam {
+
+/// A keyframe without the things that move.
+struct RestoredKeyframe {
+  KeyframeId keyframe;
+  Frame frame;         ///< as taken
+  SE3 T_world_camera;  ///< as known when it was restored
+  WorldId world;       ///< that the pose is in
+  RestoredView view;
+};
+
+/// Restores keyframes as they come, from those before them, on a thread of its own: the tracker never waits,
+/// of more keyframes than there is time for the oldest are dropped and counted, and what goes wrong costs a
+/// restored keyframe and nothing else. In deterministic mode each is restored at once.
+class RestorationWorker {
+ public:
+  struct Placed {
+    WorldId world;
+    SE3 T_world_camera;
+  };
+  /// Where a keyframe is by now. Called on the worker's thread.
+  using PlaceOf = std::function<Placed(KeyframeId)>;
+  /// Takes what was restored, on the worker's thread.
+  using OnRestored = std::function<void(const RestoredKeyframe&)>;
+
+  /// inpainter: as StaticSceneRestorer. Throws as StaticSceneRestorer does.
+  RestorationWorker(const Camera& camera, const Options& options, Mode mode,
+                    std::shared_ptr<Inpainter> inpainter, PlaceOf place_of, OnRestored on_restored);
+
+  /// The images of the frame must not be changed afterwards.
+  void submit(KeyframeId keyframe, const Frame& frame, const Removal& removal);
+
+  /// Waits until all that were not dropped are restored.
+  void drain() { worker_.drain(); }
+
+  std::size_t dropped() const;
+
+  /// What went wrong so far, in words, and how often.
+  std::map<std::string, std::size_t> faults() const;
+
+  StageTimes times() const { return worker_.times(); }
+
+ private:
+  struct Job {
+    Frame frame;
+    Removal removal;
+  };
+
+  void work(KeyframeId keyframe, StageTimes& times);
+  void restore(KeyframeId keyframe, const Job& job);
+  std::vector<const SourceView*> sources_in(WorldId world);
+
+  RestorationOptions options_;
+  Mode mode_;
+  StaticSceneRestorer restorer_;
+  PlaceOf place_of_;
+  OnRestored on_restored_;
+  std::map<KeyframeId, SourceView> sources_;  // by the worker's thread
+
+  mutable std::mutex mutex_;  // guards what follows
+  std::map<KeyframeId, Job> waiting_;
+  std::size_t dropped_ = 0;
+  std::map<std::string, std::size_t> faults_;
+
+  KeyframeWorker worker_;  // last, so that its thread stops before what it uses goes away
+};
+
+}  // namespace roslam
