@@ -111,12 +111,14 @@ Flight fly(const FlightArguments& arguments, Options options, const std::string&
   flight.slam = std::make_unique<Slam>(flight.source->camera(), options, mode, segmenter,
                                        open_vocabulary(arguments, options));
   if (map) flight.slam->continue_from(std::move(*map));
-  std::optional<RestoredFolder> restored;
+  RestoredFolder::remove_old(folder.path() / "restored");
+  std::shared_ptr<RestoredFolder> restored;
   if (arguments.restore) {
-    restored.emplace(folder.path() / "restored", flight.source->camera());
-    flight.slam->restore_keyframes(open_inpainter(arguments.models), [&](const RestoredKeyframe& keyframe) {
-      restored->add(keyframe.frame, keyframe.view, stamp(keyframe.frame.timestamp));
-    });
+    restored = std::make_shared<RestoredFolder>(folder.path() / "restored", flight.source->camera());
+    flight.slam->restore_keyframes(
+        open_inpainter(arguments.models), [restored](const RestoredKeyframe& keyframe) {
+          restored->add(keyframe.frame, keyframe.view, stamp(keyframe.frame.timestamp));
+        });
   }
   std::optional<RemovalLog> log;
   RemovalLog::remove_old(folder.path());

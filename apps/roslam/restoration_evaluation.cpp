@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 
 #include "apps/roslam/progress.hpp"
@@ -26,8 +25,12 @@ cv::Mat required_picture(const fs::path& file) {
 
 // Images of masks may have 8 or 16 bits: numbers of actors are masks too.
 cv::Mat required_mask(const fs::path& file) {
-  cv::Mat mask = cv::imread(file.string(), cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
-  if (mask.empty()) throw InputError(file.string() + ": no image of where the picture was restored");
+  const ImageFile bytes = read_label_image(file);
+  const cv::Mat mask = bytes.image.empty() ? read_depth_image(file).image : bytes.image;
+  if (mask.empty())
+    throw InputError(file.string() +
+                     ": no image of 8 or 16 bits that tells where the picture was restored; it " +
+                     bytes.error);
   return mask != 0;
 }
 

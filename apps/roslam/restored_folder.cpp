@@ -41,6 +41,15 @@ RestoredFolder::RestoredFolder(fs::path folder, const Camera& camera)
   depths_.line("# timestamp filename");
 }
 
+void RestoredFolder::remove_old(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(folder / kProvenance, error)) return;
+  fs::remove_all(folder, error);
+  if (error)
+    throw OutputError(folder.string() +
+                      ": left by an earlier run and cannot be removed; choose another --out");
+}
+
 void RestoredFolder::add(const Frame& frame, const RestoredView& restored, const std::string& name) {
   const std::string file = name + ".png";
   const std::string time = stamp(frame.timestamp);

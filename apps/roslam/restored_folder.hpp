@@ -20,6 +20,10 @@ class RestoredFolder {
   /// Throws OutputError if the folder cannot be made or is a dataset already that was not restored.
   RestoredFolder(std::filesystem::path folder, const Camera& camera);
 
+  /// Removes what an earlier run restored, so that it does not pass for the result of a later one. Throws
+  /// OutputError.
+  static void remove_old(const std::filesystem::path& folder);
+
   /// name: of the frame's files, without ending. Throws OutputError.
   void add(const Frame& frame, const RestoredView& restored, const std::string& name);
 

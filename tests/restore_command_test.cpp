@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A sequence restored on the command line and compared with the truth; and what is refused.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/program.hpp"
+#include "tests/restoration_scene.hpp"
+#include "tests/scratch.hpp"
+#include "tests/street.hpp"
+
+namespace roslam::scene {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+// A thing without a label walks through a room; the same frames without it are the truth.
+class RestoreCommand : public testing::Test {
+ protected:
+  static constexpr int kFrames = 40;
+
+  static void SetUpTestSuite() {
+    folder_ = fs::path(testing::TempDir()) / ("roslam_restore_" + std::to_string(getpid()));
+    fs::remove_all(folder_);
+    const Stage stage;
+    make("walk", stage, true);
+    make("truth", stage, false);
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+
+  static std::string stamp(int frame) {
+    char text[32];
+    std::snprintf(text, sizeof(text), "%.6f", 1.0 + frame / 30.0);
+    return text;
+  }
+
+  static void make(const std::string& name, const Stage& stage, bool with_thing) {
+    for (const char* part : {"rgb", "depth", "instances"}) fs::create_directories(folder_ / name / part);
+    std::ofstream rgb(folder_ / name / "rgb.txt"), depth(folder_ / name / "depth.txt");
+    std::ofstream(folder_ / name / "camera.yaml") << camera_to_yaml(millimetres(stage.camera()));
+    for (int i = 0; i < kFrames; ++i) {
+      const Panel thing{-1.2 + 0.04 * i, -0.5, -0.8 + 0.04 * i, 0.6, 1.4};
+      const View view = stage.show(with_thing ? room({thing}) : room(), looking_from(0.004 * i, 0.0, 0.0));
+      const std::string file = stamp(i) + ".png";
+      cv::Mat packed;
+      view.depth.convertTo(packed, CV_16U, 1000.0);
+      cv::imwrite((folder_ / name / "rgb" / file).string(), in_colour(view.grey));
+      cv::imwrite((folder_ / name / "depth" / file).string(), packed);
+      cv::imwrite((folder_ / name / "instances" / file).string(), view.shows(kThing));
+      rgb << stamp(i) << " rgb/" << file << "\n";
+      depth << stamp(i) << " depth/" << file << "\n";
+    }
+  }
+
+  static Camera millimetres(Camera camera) {
+    camera.depth_units_per_metre = 1000.0;
+    return camera;
+  }
+
+  Outcome roslam(const std::string& arguments) const {
+    return shell_in(folder_, "'" ROSLAM_PROGRAM "' " + arguments);
+  }
+
+  // Flown once for all cases.
+  void fly() const {
+    if (fs::exists(folder_ / "run/trajectory.txt")) return;
+    const auto outcome = roslam("run walk --camera walk/camera.yaml --dynamic geometry --out run --quiet");
+    ASSERT_EQ(outcome.code, 0) << outcome.error;
+  }
+
+  json restored(const std::string& method, const std::string& out) const {
+    const auto outcome = roslam("restore run --method " + method + " --out " + out + " --json");
+    EXPECT_EQ(outcome.code, 0) << outcome.error;
+    return json::parse(outcome.out, nullptr, false);
+  }
+
+  json evaluated(const std::string& arguments) const {
+    const auto outcome = roslam("evaluate restoration --no-labels --json " + arguments);
+    EXPECT_EQ(outcome.code, 0) << outcome.error;
+    return json::parse(outcome.out, nullptr, false);
+  }
+
+  static inline fs::path folder_;
+};
+
+TEST_F(RestoreCommand, WritesTheSequenceWithoutWhatMoves) {
+  fly();
+  const json report = restored("both", "static");
+  EXPECT_EQ(report.at("frames"), kFrames);
+  EXPECT_GT(report.at("reprojected_share_of_hole").get<double>(), 0.8);
+  for (const char* file : {"rgb.txt", "depth.txt", "camera.yaml", "before_after.jpg", "restoration.json"})
+    EXPECT_TRUE(fs::is_regular_file(folder_ / "static" / file)) << file;
+  const std::string file = stamp(25) + ".png";
+  const cv::Mat provenance =
+      cv::imread((folder_ / "static/provenance" / file).string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat taken = cv::imread((folder_ / "walk/rgb" / file).string());
+  const cv::Mat colour = cv::imread((folder_ / "static/rgb" / file).string());
+  const cv::Mat truth = cv::imread((folder_ / "truth/rgb" / file).string());
+  ASSERT_EQ(provenance.type(), CV_8UC1);
+  EXPECT_EQ(difference(colour, taken, provenance == 0), 0.0);
+  const cv::Mat thing = cv::imread((folder_ / "walk/instances" / file).string(), cv::IMREAD_UNCHANGED);
+  EXPECT_GT(share_set(thing, provenance != 0), 0.9);
+  EXPECT_LT(difference(colour, truth, provenance != 0), 0.3 * difference(taken, truth, provenance != 0));
+  // Another system can read it.
+  const auto again = roslam("run static --camera static/camera.yaml --dynamic none --out again --quiet");
+  EXPECT_EQ(again.code, 0) << again.error;
+}
+
+TEST_F(RestoreCommand, IsNearerToTheTruthThanClassicMethods) {
+  fly();
+  double classic = 0.0;
+  for (const std::string method : {"telea", "navier-stokes"}) {
+    restored(method, method);
+    classic = std::max(classic, evaluated("--truth truth --estimate " + method).at("psnr_db").get<double>());
+  }
+  restored("both", "compared");
+  const json error = evaluated("--truth truth --estimate compared");
+  EXPECT_GT(error.at("psnr_db").get<double>(), classic + 3.0);
+  EXPECT_LT(error.at("depth_error_reprojected").get<double>(), 0.03);
+  // The same by names and with masks of one's own, as for pictures of other origin.
+  const json by_name = evaluated("--truth truth/rgb --estimate compared/rgb --masks compared/provenance");
+  EXPECT_EQ(by_name.at("psnr_db"), error.at("psnr_db"));
+  EXPECT_TRUE(by_name.at("depth_error_reprojected").is_null());
+  EXPECT_GT(evaluated("--truth truth --estimate compared --masks walk/instances")
+                .at("pictures_with_hole")
+                .get<int>(),
+            30);
+}
+
+TEST_F(RestoreCommand, ReprojectionAloneLeavesTheRestBlack) {
+  fly();
+  restored("reprojection", "alone");
+  const std::string file = stamp(25) + ".png";
+  const cv::Mat provenance = cv::imread((folder_ / "alone/provenance" / file).string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat colour = cv::imread((folder_ / "alone/rgb" / file).string());
+  EXPECT_EQ(cv::norm(colour, cv::NORM_INF, provenance == 255), 0.0);
+}
+
+TEST_F(RestoreCommand, FliesFirstWhereThatWasNotDone) {
+  const auto outcome = roslam("restore walk --camera walk/camera.yaml --out flown --every 10 --quiet");
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "flown/run/run.json"));
+  EXPECT_NE(outcome.out.find("restored 4 frames"), std::string::npos) << outcome.out;
+}
+
+TEST_F(RestoreCommand, TheSameRunGivesTheSameBytes) {
+  fly();
+  restored("both", "first");
+  restored("both", "second");
+  for (const int frame : {5, 20, 35}) {
+    const std::string file = "rgb/" + stamp(frame) + ".png";
+    EXPECT_EQ(content(folder_ / "first" / file), content(folder_ / "second" / file)) << file;
+  }
+}
+
+TEST_F(RestoreCommand, RestoresKeyframesInFlight) {
+  const std::string run = "run walk --camera walk/camera.yaml --dynamic geometry --quiet --out ";
+  const auto with = roslam(run + "live --restore");
+  EXPECT_EQ(with.code, 0) << with.error;
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "live/restored/rgb.txt"));
+  EXPECT_NE(with.out.find("restored: "), std::string::npos);
+  const auto without = roslam(run + "plain");
+  EXPECT_EQ(content(folder_ / "live/trajectory.txt"), content(folder_ / "plain/trajectory.txt"));
+  EXPECT_TRUE(fs::exists(folder_ / "live/restored"));
+  // What an earlier run restored must not pass for the result of a later one.
+  const auto later = roslam(run + "live");
+  EXPECT_EQ(later.code, 0) << later.error;
+  EXPECT_FALSE(fs::exists(folder_ / "live/restored"));
+}
+
+TEST_F(RestoreCommand, DoesWithoutItsNetworkAndSaysSoOnce) {
+  fly();
+  fs::create_directories(folder_ / "bare");
+  fs::copy_file(ROSLAM_PROGRAM, folder_ / "bare/roslam", fs::copy_options::overwrite_existing);
+  const auto outcome = shell_in(folder_, "bare/roslam restore run --out without --every 10 --quiet");
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  EXPECT_NE(outcome.error.find("classic method"), std::string::npos);
+  EXPECT_NE(outcome.out.find("restored 4 frames"), std::string::npos);
+}
+
+TEST_F(RestoreCommand, RefusesInOneLineWhatItCannotDo) {
+  fly();
+  using street::expect_refused;
+  expect_refused(roslam("restore nowhere --camera simulated --out x"), {"nowhere"});
+  expect_refused(roslam("restore walk --out x"), {"--camera"});
+  expect_refused(roslam("restore run --out walk"), {"walk", "dataset", "--out"});
+  expect_refused(roslam("restore run --out x --models nowhere"), {"roslam-restorer-person.onnx"});
+  fs::create_directories(folder_ / "gone");
+  for (const char* file : {"run.json", "trajectory.txt", "keyframes.txt", "descriptors.jsonl"})
+    fs::copy_file(folder_ / "run" / file, folder_ / "gone" / file, fs::copy_options::overwrite_existing);
+  const auto without_masks = roslam("restore gone --out x --quiet");
+  EXPECT_EQ(without_masks.code, 0) << without_masks.error;
+  EXPECT_NE(without_masks.out.find("mask missing or unusable"), std::string::npos) << without_masks.out;
+  std::ofstream(folder_ / "gone/run.json") << "{";
+  expect_refused(roslam("restore gone --out x"), {"run.json"});
+  EXPECT_EQ(roslam("restore run").code, 2);
+  EXPECT_EQ(roslam("restore run --out x --method magic").code, 2);
+}
+
+TEST_F(RestoreCommand, EvaluationRefusesWhatTellsNothing) {
+  fly();
+  using street::expect_refused;
+  restored("telea", "scored");
+  const std::string evaluate = "evaluate restoration --no-labels --quiet ";
+  expect_refused(roslam(evaluate + "--truth nowhere --estimate scored"), {"nowhere"});
+  expect_refused(roslam(evaluate + "--truth truth --estimate scored --masks nowhere"), {"nowhere"});
+  fs::create_directories(folder_ / "other");
+  cv::imwrite((folder_ / "other/x.png").string(), cv::Mat(240, 320, CV_8UC3, cv::Scalar::all(1)));
+  expect_refused(roslam(evaluate + "--truth other --estimate scored"), {"no picture of the time or name"});
+  expect_refused(roslam(evaluate + "--truth truth --estimate scored --masks truth/instances"),
+                 {"no mask has a hole"});
+}
+
+}  // namespace
+}  // namespace roslam::scene
