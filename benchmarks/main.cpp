@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   rb::register_pose_benchmarks();
   rb::register_bundle_benchmarks();
   rb::register_place_benchmarks(flight);
+  rb::register_restoration_benchmarks(flight);
   rb::register_segmentation_benchmarks(flight);
   rb::register_slam_benchmarks(flight);
   benchmark::RunSpecifiedBenchmarks();

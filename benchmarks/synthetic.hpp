@@ -8,10 +8,10 @@
 
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/pose_optimiser.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "roslam/mapping/bundle_adjustment.hpp"
 #include "roslam/sources/frame_source.hpp"
-#include "roslam/geometry/pose_optimiser.hpp"
 
 namespace roslam::benchmarks {
 
