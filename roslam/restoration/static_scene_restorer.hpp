@@ -24,10 +24,10 @@ enum class Provenance : std::uint8_t {
 };
 
 struct RestorationOptions {
-  bool reproject = true;        ///< fill from other views
-  bool invent = true;           ///< paint the rest; false: it is left black and without depth
-  double min_certainty = 0.02;  ///< of a reprojected pixel, 0 to 1; what is less sure is painted
-  int margin = 8;               ///< pixels by which what was removed is dilated: outlines are blurred
+  bool reproject = true;         ///< fill from other views
+  bool invent = true;            ///< paint the rest; false: it is left black and without depth
+  double min_certainty = 0.004;  ///< of a reprojected pixel, 0 to 1; what is less sure is painted
+  int margin = 8;                ///< pixels by which what was removed is dilated: outlines are blurred
 
   // Which frames others are filled from; each takes 2.5 MB at 640x480.
   double source_interval = 0.5;  ///< seconds; of a recorded run, beside keyframes, a frame as often
