@@ -187,6 +187,14 @@ TEST_F(RestoreCommand, RefusesInOneLineWhatItCannotDo) {
   expect_refused(roslam("restore nowhere --camera simulated --out x"), {"nowhere"});
   expect_refused(roslam("restore walk --out x"), {"--camera"});
   expect_refused(roslam("restore run --out walk"), {"walk", "dataset", "--out"});
+  expect_refused(roslam("restore run --out run"), {"run", "--out"});
+  expect_refused(roslam("restore run --out truth/rgb/.."), {"truth", "--out"});
+  fs::create_directories(folder_ / "album/rgb");
+  std::ofstream(folder_ / "album/rgb/holiday.png") << "dear";
+  expect_refused(roslam("restore run --out album"), {"album", "--out"});
+  EXPECT_TRUE(fs::exists(folder_ / "album/rgb/holiday.png"));
+  expect_refused(roslam("restore walk --camera walk/camera.yaml --out truth"), {"truth", "--out"});
+  EXPECT_FALSE(fs::exists(folder_ / "truth/run"));  // before anything is flown
   expect_refused(roslam("restore run --out x --models nowhere"), {"roslam-restorer-person.onnx"});
   fs::create_directories(folder_ / "gone");
   for (const char* file : {"run.json", "trajectory.txt", "keyframes.txt", "descriptors.jsonl"})

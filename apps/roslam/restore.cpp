@@ -158,6 +158,7 @@ void print(const Json& report) {
 void restore(RestoreArguments arguments, const std::string& version) {
   const InterruptWatcher interrupt;
   arguments.flight.quiet |= arguments.json;
+  RestoredFolder::require_usable(arguments.out);
   const RecordedRun run(run_folder_of(arguments, version, interrupt.token()));
   StaticSceneRestorer restorer(run.camera(), settings_for(arguments, run.removal().options()),
                                inpainter_for(arguments));

@@ -19,13 +19,10 @@ constexpr std::size_t kPictures = 6;  // of before and after; twice as many are 
 constexpr int kPictureWidth = 1200;   // pixels
 constexpr const char* kProvenance = "provenance";
 
-// A dataset must not be replaced by what was made of it, but an earlier result may.
 fs::path made(const fs::path& folder) {
+  RestoredFolder::require_usable(folder);
   make_folder(folder);
   std::error_code error;
-  if (fs::exists(folder / "rgb.txt", error) && !fs::exists(folder / kProvenance, error))
-    throw OutputError(folder.string() +
-                      ": is a dataset, which the result would replace; choose another --out");
   for (const char* name : {"rgb", "depth", kProvenance}) {
     fs::remove_all(folder / name, error);
     make_folder(folder / name);
@@ -39,6 +36,16 @@ RestoredFolder::RestoredFolder(fs::path folder, const Camera& camera)
   write_file(folder_ / "camera.yaml", camera_to_yaml(camera));
   colours_.line("# timestamp filename");
   depths_.line("# timestamp filename");
+}
+
+void RestoredFolder::require_usable(const fs::path& folder) {
+  std::error_code error;
+  if (fs::exists(folder / kProvenance, error)) return;
+  for (const char* name : {"rgb.txt", "rgb", "depth", "run.json"}) {
+    if (fs::exists(folder / name, error))
+      throw OutputError(folder.string() +
+                        ": holds a dataset or a run, which the result could replace; choose another --out");
+  }
 }
 
 void RestoredFolder::remove_old(const fs::path& folder) {

@@ -17,8 +17,12 @@ namespace roslam::app {
 /// A sequence without its moving things in the TUM format, and beside it where each pixel comes from.
 class RestoredFolder {
  public:
-  /// Throws OutputError if the folder cannot be made or is a dataset already that was not restored.
+  /// Replaces what an earlier restoration left there. Throws OutputError if the folder is not usable or
+  /// cannot be made.
   RestoredFolder(std::filesystem::path folder, const Camera& camera);
+
+  /// Throws OutputError if a folder holds pictures of other origin or a run.
+  static void require_usable(const std::filesystem::path& folder);
 
   /// Removes what an earlier run restored, so that it does not pass for the result of a later one. Throws
   /// OutputError.
