@@ -24,11 +24,13 @@ def run_evaluate(arguments):
         generator = train.load_generator(file)
         methods[name] = lambda sample, generator=generator: evaluation.paint(generator, sample)
     held_out = samples.validation_samples(arguments.data)
+    segmenter = checkpoint.load_network(arguments.segmenter)
     print(f"{len(held_out)} held-out streets, holes of 10 to 30 %; in brackets where the truth does not move")
     for kind, of_kind in [("all", held_out), *evaluation.by_class(held_out).items()]:
-        for name, s in (evaluation.score(of_kind, methods) if of_kind else {}).items():
+        for name, s in (evaluation.score(of_kind, methods, segmenter) if of_kind else {}).items():
             print(f"{kind:8} {name:20} PSNR {s['psnr']:.2f} ({s['psnr_static']:.2f}) dB  SSIM {s['ssim']:.3f} "
-                  f"({s['ssim_static']:.3f})  L1 {s['l1']:.1f} ({s['l1_static']:.1f}) grey levels")
+                  f"({s['ssim_static']:.3f})  L1 {s['l1']:.1f} ({s['l1_static']:.1f}) grey levels  "
+                  f"taken for movable {100 * s['movable']:.2f} %")
 
 
 def run_export(arguments):
@@ -36,6 +38,11 @@ def run_export(arguments):
     export.export(generator, arguments.out)
     if arguments.weights:
         train.save_weights(arguments.weights, generator)
+
+
+def add_segmenter(command, use):
+    command.add_argument("--segmenter", default="models/roslam-pspnet.pt",
+                         help=f"checkpoint of the segmentation network, {use}")
 
 
 def main():
@@ -51,14 +58,14 @@ def main():
 
     added = command("train", run_train, "train a generator, or go on with a run that was stopped", data=True)
     added.add_argument("--out", required=True, help="folder of the run: log.jsonl and last.pt; a run in it goes on")
-    added.add_argument("--segmenter", default="models/roslam-pspnet.pt",
-                       help="checkpoint of the segmentation network, whose features are compared")
+    add_segmenter(added, "whose features are compared")
     added.add_argument("--start-from", help="checkpoint of the same variant whose weights a new run starts with")
     add_options(added, train.TrainingOptions)
     add_options(added, LossOptions)
 
     added = command("evaluate", run_evaluate, "compare generators with OpenCV's methods on held-out streets", data=True)
     added.add_argument("--checkpoint", nargs="*", default=[], metavar="NAME=FILE")
+    add_segmenter(added, "which says what of the painted may move")
 
     added = command("export", run_export, "write a checkpoint as an ONNX file for each class and check them with OpenCV")
     added.add_argument("--checkpoint", required=True)

@@ -5,6 +5,8 @@ import numpy as np
 import torch
 
 from training.restoration.networks import CLASSES
+from training.segmentation import label_set
+from training.segmentation.evaluation import predict
 
 INPAINT_RADIUS = 5  # pixels, of OpenCV's methods
 
@@ -48,9 +50,15 @@ def classic(method):
     return inpaint
 
 
-def score(samples, methods):
+def movable_share(segmenter, estimate, where):
+    """Share of the pixels asked for that a segmentation network takes for what may move."""
+    return np.isin(predict(segmenter, estimate)[where], label_set.MOVABLE).mean()
+
+
+def score(samples, methods, segmenter=None):
     """methods: name -> function of a sample that gives a picture. Returns name -> {"psnr", "ssim", "l1", and the same of
-    the pixels whose truth is static}: means over the samples, absolute error in grey levels."""
+    the pixels whose truth is static; with a segmenter "movable"}: means over the samples, absolute error in grey
+    levels."""
     result = {}
     for name, method in methods.items():
         rows = []
@@ -63,6 +71,8 @@ def score(samples, methods):
                 error = np.abs(sample.picture[where].astype(np.float64) - estimate[where])
                 row |= {"psnr" + suffix: psnr(sample.picture, estimate, where),
                         "ssim" + suffix: ssim(sample.picture, estimate, where), "l1" + suffix: error.mean()}
+            if segmenter is not None:
+                row["movable"] = movable_share(segmenter, estimate, sample.hole)
             rows.append(row)
         keys = {k for row in rows for k in row}
         result[name] = {k: float(np.mean([row[k] for row in rows if k in row])) for k in sorted(keys)}

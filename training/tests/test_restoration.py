@@ -269,6 +269,25 @@ class Measures(unittest.TestCase):
             self.assertLess(scored[name]["psnr"], scored["truth"]["psnr"])
 
 
+    def test_what_may_move_is_counted_in_the_hole_only(self):
+        class PersonOnTheLeft(torch.nn.Module):
+            def __init__(self):
+                super().__init__()
+                self.weight = torch.nn.Parameter(torch.zeros(1))
+
+            def forward(self, image):
+                scores = torch.zeros(1, 19, image.shape[2] // 2, image.shape[3] // 2)
+                scores[:, 0] = 1
+                scores[:, 11, :, :scores.shape[3] // 2] = 2
+                return scores
+
+        hole = np.zeros((64, 64), bool)
+        hole[16:48, 24:40] = True  # half of it on the left
+        sample = Sample(self.picture[:64, :64], hole, hole, np.ones_like(hole), 0)
+        scored = evaluation.score([sample], {"same": lambda s: s.picture}, PersonOnTheLeft().eval())
+        self.assertAlmostEqual(scored["same"]["movable"], 0.5, delta=0.1)
+
+
 class FlatEyes(torch.nn.Module):
     """Stands for the segmentation network: features are the picture, bright red moves."""
 
