@@ -29,7 +29,8 @@ std::shared_ptr<Inpainter> network() {
   return models.empty() ? nullptr : std::make_shared<GanInpainter>(models, InferenceBackend::kOpenCv);
 }
 
-// What nobody else saw: with sources that have lost the same part of the scene, all of it.
+// From ten views that show all of what is hidden, or from none; the rest is painted by the network or,
+// without it, by a classic method.
 void restore(benchmark::State& state, RenderedFlight& flight, bool is_seen, bool is_painted) {
   auto inpainter = is_painted ? network() : nullptr;
   if (is_painted && !inpainter) {

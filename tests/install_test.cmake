@@ -50,3 +50,10 @@ file(SHA256 ${WORK}/map.roslam after)
 if(NOT result EQUAL 1 OR NOT errors MATCHES "never met" OR NOT before STREQUAL after)
   message(FATAL_ERROR "a flight elsewhere ended with ${result}: ${errors}")
 endif()
+
+# A keyframe without what moves.
+run_step(${WORK}/build/restore_scene ${WORK}/flight ${WORK}/flight/camera.yaml ${WORK}/prefix/share/roslam/models
+  ${WORK}/restored)
+if(NOT EXISTS ${WORK}/restored/0.png)
+  message(FATAL_ERROR "the example restored no keyframe")
+endif()

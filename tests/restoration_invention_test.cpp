@@ -21,6 +21,7 @@ class FlatInpainter : public Inpainter {
     EXPECT_EQ(square.width, square.height);
     EXPECT_EQ(cv::boundingRect(hole) & square, cv::boundingRect(hole));
     kinds.push_back(kind);
+    crops.push_back(crop.clone());
     holes.push_back(cv::countNonZero(hole));
     return cv::Mat(crop.size(), CV_8UC3, colour);
   }
@@ -28,6 +29,7 @@ class FlatInpainter : public Inpainter {
   cv::Scalar colour{10, 200, 90};
   std::vector<Movable> kinds;
   std::vector<int> holes;
+  std::vector<cv::Mat> crops;
 };
 
 const cv::Size kSize(320, 240);
@@ -60,6 +62,7 @@ TEST_F(Invention, ContentOfTheHoleDoesNotMatter) {
   EXPECT_EQ(
       cv::norm(invent(picture_, where, {}, &inpainter_), invent(other, where, {}, &inpainter_), cv::NORM_INF),
       0.0);
+  EXPECT_EQ(cv::norm(inpainter_.crops[0], inpainter_.crops[1], cv::NORM_INF), 0.0);
   EXPECT_EQ(cv::norm(invent(picture_, where, {}, nullptr), invent(other, where, {}, nullptr), cv::NORM_INF),
             0.0);
 }

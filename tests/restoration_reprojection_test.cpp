@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <memory>
 
 #include "roslam/error.hpp"
+#include "roslam/geometry/pixel_rays.hpp"
 #include "roslam/restoration/reprojection.hpp"
 #include "tests/restoration_scene.hpp"
 
@@ -131,7 +133,47 @@ TEST_F(Reprojection, WorksForATargetWithoutDepth) {
   EXPECT_GT(share_set(view.removed, area.filled), 0.95);
 }
 
-TEST_F(Reprojection, DistortedPicturesFillAlike) {
+TEST_F(Reprojection, FillsDistortedPictures) {
+  Camera camera = small_camera();
+  camera.distortion = {0.12, -0.2, 0.002, -0.001, 0.0};
+  // The scene as the distorting camera shows it, resampled from one with a wider view.
+  Camera wide = camera;
+  wide.distortion = {};
+  wide.width = 480;
+  wide.height = 360;
+  wide.cx += 80;
+  wide.cy += 60;
+  const Stage stage(wide);
+  cv::Mat map(camera.height, camera.width, CV_32FC2);
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const Eigen::Vector2d straight = camera.undistort({x, y});
+      map.at<cv::Vec2f>(y, x) = {static_cast<float>(straight.x() + 80),
+                                 static_cast<float>(straight.y() + 60)};
+    }
+  }
+  const auto taken_through = [&](const std::vector<Panel>& panels, const SE3& pose, double time) {
+    roslam::View view = taken(stage, panels, pose, time);
+    cv::remap(view.colour, view.colour, map, {}, cv::INTER_LINEAR);
+    cv::remap(view.depth, view.depth, map, {}, cv::INTER_NEAREST);
+    cv::remap(view.removed, view.removed, map, {}, cv::INTER_NEAREST);
+    return view;
+  };
+  const auto one =
+      source_view(taken_through(room({kPerson.shifted(0.8)}), looking_from(-0.1, 0.0, 0.0), 8.0), {});
+  const auto two =
+      source_view(taken_through(room({kPerson.shifted(-0.9)}), looking_from(0.1, 0.0, 0.0), 12.0), {});
+  ASSERT_TRUE(one && two);
+  auto target = taken_through(room({kPerson}), SE3(), 10.0);
+  target.depth.at<float>(5, 5) = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<const SourceView*> sources{&*one, &*two};
+  const auto area = BackgroundReprojection(camera, {}).fill(target, target.removed, sources);
+  const auto truth = taken_through(room(), SE3(), 10.0);
+  EXPECT_GT(share_set(target.removed, area.filled), 0.95);
+  EXPECT_LT(difference(truth.colour, area.colour, area.filled), 4.0);
+}
+
+TEST(PixelRays, PixelsComeBackThroughLensDistortion) {
   Camera camera = small_camera();
   camera.distortion = {0.1, -0.2, 0.001, -0.001, 0.0};
   const PixelRays rays(camera);

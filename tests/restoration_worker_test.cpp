@@ -54,10 +54,13 @@ class Worker : public testing::Test {
   void start(Mode mode, const Options& options = {}) {
     worker_.emplace(
         stage_.camera(), options, mode, inpainter_,
-        [this](KeyframeId id) {
+        [this](const std::vector<KeyframeId>& ids) {
           const std::scoped_lock lock(mutex_);
-          return RestorationWorker::Placed{worlds_.count(id.value) > 0 ? worlds_.at(id.value) : WorldId{0},
-                                           shift_ * places_.at(id.value)};
+          std::vector<RestorationWorker::Placed> places;
+          for (const KeyframeId id : ids)
+            places.push_back({worlds_.count(id.value) > 0 ? worlds_.at(id.value) : WorldId{0},
+                              shift_ * places_.at(id.value)});
+          return places;
         },
         [this](const RestoredKeyframe& keyframe) {
           const std::scoped_lock lock(mutex_);

@@ -46,9 +46,11 @@ class RestoreCommand : public testing::Test {
       const std::string file = stamp(i) + ".png";
       cv::Mat packed;
       view.depth.convertTo(packed, CV_16U, 1000.0);
+      cv::Mat instances;
+      view.shows(kThing).convertTo(instances, CV_16U);
       cv::imwrite((folder_ / name / "rgb" / file).string(), in_colour(view.grey));
       cv::imwrite((folder_ / name / "depth" / file).string(), packed);
-      cv::imwrite((folder_ / name / "instances" / file).string(), view.shows(kThing));
+      cv::imwrite((folder_ / name / "instances" / file).string(), instances);
       rgb << stamp(i) << " rgb/" << file << "\n";
       depth << stamp(i) << " depth/" << file << "\n";
     }
@@ -100,7 +102,7 @@ TEST_F(RestoreCommand, WritesTheSequenceWithoutWhatMoves) {
   const cv::Mat truth = cv::imread((folder_ / "truth/rgb" / file).string());
   ASSERT_EQ(provenance.type(), CV_8UC1);
   EXPECT_EQ(difference(colour, taken, provenance == 0), 0.0);
-  const cv::Mat thing = cv::imread((folder_ / "walk/instances" / file).string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat thing = cv::imread((folder_ / "walk/instances" / file).string(), cv::IMREAD_UNCHANGED) != 0;
   EXPECT_GT(share_set(thing, provenance != 0), 0.9);
   EXPECT_LT(difference(colour, truth, provenance != 0), 0.3 * difference(taken, truth, provenance != 0));
   // Another system can read it.
@@ -132,10 +134,16 @@ TEST_F(RestoreCommand, IsNearerToTheTruthThanClassicMethods) {
 TEST_F(RestoreCommand, ReprojectionAloneLeavesTheRestBlack) {
   fly();
   restored("reprojection", "alone");
-  const std::string file = stamp(25) + ".png";
-  const cv::Mat provenance = cv::imread((folder_ / "alone/provenance" / file).string(), cv::IMREAD_UNCHANGED);
-  const cv::Mat colour = cv::imread((folder_ / "alone/rgb" / file).string());
-  EXPECT_EQ(cv::norm(colour, cv::NORM_INF, provenance == 255), 0.0);
+  int open = 0;
+  for (int frame = 0; frame < kFrames; ++frame) {
+    const std::string file = stamp(frame) + ".png";
+    const cv::Mat provenance =
+        cv::imread((folder_ / "alone/provenance" / file).string(), cv::IMREAD_UNCHANGED);
+    const cv::Mat colour = cv::imread((folder_ / "alone/rgb" / file).string());
+    open += cv::countNonZero(provenance == 255);
+    EXPECT_EQ(cv::norm(colour, cv::NORM_INF, provenance == 255), 0.0) << file;
+  }
+  EXPECT_GT(open, 100);
 }
 
 TEST_F(RestoreCommand, FliesFirstWhereThatWasNotDone) {
@@ -160,7 +168,14 @@ TEST_F(RestoreCommand, RestoresKeyframesInFlight) {
   const auto with = roslam(run + "live --restore");
   EXPECT_EQ(with.code, 0) << with.error;
   EXPECT_TRUE(fs::is_regular_file(folder_ / "live/restored/rgb.txt"));
-  EXPECT_NE(with.out.find("restored: "), std::string::npos);
+  EXPECT_EQ(with.out.find("restored: 0 "), std::string::npos);
+  const json report = json::parse(content(folder_ / "live/restored/restoration.json"));
+  EXPECT_GT(report.at("frames").get<int>(), 0);
+  EXPECT_EQ(report.at("dropped"), 0);
+  std::size_t pictures = 0;
+  for (const auto& file : fs::directory_iterator(folder_ / "live/restored/rgb"))
+    pictures += !cv::imread(file.path().string()).empty();
+  EXPECT_EQ(pictures, report.at("frames"));
   const auto without = roslam(run + "plain");
   EXPECT_EQ(content(folder_ / "live/trajectory.txt"), content(folder_ / "plain/trajectory.txt"));
   EXPECT_TRUE(fs::exists(folder_ / "live/restored"));
@@ -168,6 +183,66 @@ TEST_F(RestoreCommand, RestoresKeyframesInFlight) {
   const auto later = roslam(run + "live");
   EXPECT_EQ(later.code, 0) << later.error;
   EXPECT_FALSE(fs::exists(folder_ / "live/restored"));
+}
+
+TEST_F(RestoreCommand, RestoresKeyframesInRealTime) {
+  const auto outcome = roslam(
+      "run walk --camera walk/camera.yaml --dynamic geometry --quiet --real-time --restore --out paced");
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  const json report = json::parse(content(folder_ / "paced/restored/restoration.json"));
+  EXPECT_GT(report.at("frames").get<int>(), 0);
+  EXPECT_TRUE(report.at("faults").empty());
+}
+
+TEST_F(RestoreCommand, WhatRestoreWroteIsNotDeletedByALaterFlight) {
+  const std::string run = "run walk --camera walk/camera.yaml --dynamic geometry --quiet --out home";
+  ASSERT_EQ(roslam(run).code, 0);
+  ASSERT_EQ(roslam("restore home --out home/restored --every 20 --quiet").code, 0);
+  ASSERT_EQ(roslam(run).code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "home/restored/rgb.txt"));
+}
+
+TEST_F(RestoreCommand, NeverReplacesTheFramesItRestores) {
+  fly();
+  using street::expect_refused;
+  restored("telea", "source");
+  expect_refused(roslam("restore source --camera source/camera.yaml --out source"), {"source", "--out"});
+  expect_refused(roslam("restore source/rgb/.. --camera source/camera.yaml --out source"), {"--out"});
+  ASSERT_EQ(roslam("run source --camera source/camera.yaml --dynamic none --quiet --out of_source").code, 0);
+  expect_refused(roslam("restore of_source --out source"), {"source", "--out"});
+  EXPECT_TRUE(fs::exists(folder_ / ("source/rgb/" + stamp(0) + ".png")));
+}
+
+TEST_F(RestoreCommand, RestoresASimulatedRun) {
+  ASSERT_EQ(roslam("run simulated:turn --traffic light --frames 3 --seed 2 --quiet --out simulated").code, 0);
+  const auto outcome = roslam("restore simulated --out turned --quiet");
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  ASSERT_EQ(roslam("simulate turn --traffic light --frames 3 --seed 2 --out rendered").code, 0);
+  const std::string file = "0.000000.png";
+  const cv::Mat provenance =
+      cv::imread((folder_ / "turned/provenance" / file).string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat colour = cv::imread((folder_ / "turned/rgb" / file).string());
+  const cv::Mat taken = cv::imread((folder_ / "rendered/rgb" / file).string());
+  ASSERT_FALSE(colour.empty());
+  EXPECT_EQ(difference(colour, taken, provenance == 0), 0.0);  // the same flight
+  auto old = json::parse(content(folder_ / "simulated/run.json"));
+  old.erase("flight");
+  std::ofstream(folder_ / "simulated/run.json") << old.dump();
+  street::expect_refused(roslam("restore simulated --out turned --quiet"), {"repeat the run"});
+}
+
+TEST_F(RestoreCommand, BenchmarkComparesTheMethods) {
+  const auto outcome = roslam(
+      "benchmark restoration --sequences walk --truth truth --truth-depth-units 1000 --every 8 --methods "
+      "telea "
+      "reprojection --out results --json --quiet");
+  ASSERT_EQ(outcome.code, 0) << outcome.error;
+  const json report = json::parse(outcome.out);
+  const json& methods = report.at("sequences").at(0).at("methods");
+  EXPECT_LT(methods.at("reprojection").at("all").at("depth_error_reprojected").get<double>(), 0.05);
+  EXPECT_GT(methods.at("telea").at("behind_actors").at("pictures_with_hole").get<int>(), 2);
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "results/benchmark.md"));
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "results/walk.jpg"));
 }
 
 TEST_F(RestoreCommand, DoesWithoutItsNetworkAndSaysSoOnce) {
@@ -179,6 +254,9 @@ TEST_F(RestoreCommand, DoesWithoutItsNetworkAndSaysSoOnce) {
   EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
   EXPECT_NE(outcome.error.find("classic method"), std::string::npos);
   EXPECT_NE(outcome.out.find("restored 4 frames"), std::string::npos);
+  EXPECT_EQ(json::parse(content(folder_ / "without/restoration.json")).at("network"), false);
+  street::expect_refused(shell_in(folder_, "bare/roslam restore run --method gan --out without --quiet"),
+                         {"roslam-restorer", "--models"});
 }
 
 TEST_F(RestoreCommand, RefusesInOneLineWhatItCannotDo) {
@@ -204,7 +282,15 @@ TEST_F(RestoreCommand, RefusesInOneLineWhatItCannotDo) {
   EXPECT_NE(without_masks.out.find("mask missing or unusable"), std::string::npos) << without_masks.out;
   std::ofstream(folder_ / "gone/run.json") << "{";
   expect_refused(roslam("restore gone --out x"), {"run.json"});
+  fs::copy_file(folder_ / "run/run.json", folder_ / "gone/run.json", fs::copy_options::overwrite_existing);
+  auto moved = json::parse(content(folder_ / "gone/run.json"));
+  moved["source"] = "elsewhere";
+  std::ofstream(folder_ / "gone/run.json") << moved.dump();
+  expect_refused(roslam("restore gone --out x"), {"elsewhere", "not there"});
   EXPECT_EQ(roslam("restore run").code, 2);
+  EXPECT_EQ(roslam("restore run --out x --camera simulated").code, 2);
+  EXPECT_EQ(roslam("run walk --camera walk/camera.yaml --out x --models y").code, 2);
+  EXPECT_EQ(roslam("run walk --camera walk/camera.yaml --out x --restore --dynamic none").code, 2);
   EXPECT_EQ(roslam("restore run --out x --method magic").code, 2);
 }
 

@@ -151,7 +151,7 @@ Composition write_composition(const CompositionSettings& settings, const Compose
     }
     frame->T_world_camera = pose->T_world_camera;
     const ComposedFrame composed = composer.compose(*frame);
-    const std::string time = stamp(frame->timestamp);
+    const std::string time = time_text(frame->timestamp);
     write_images(settings.out, time + ".png", composed, settings.depth_units_per_metre);
     lists.add(time, source.colour_file(frame->index), *source.depth_file(frame->index));
     made.too_far +=

@@ -4,6 +4,7 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
@@ -88,6 +89,30 @@ RunSummary track(FrameSource& source, Slam& slam, std::optional<RemovalLog>& log
       },
       stop);
 }
+// Shared with the thread that restores.
+std::shared_ptr<RestoredFolder> begin_restoration(Flight& flight, const FlightArguments& arguments,
+                                                  const RunFolder& run) {
+  const auto path = run.path() / "restored";
+  RestoredFolder::require_apart(path, arguments.source.name);
+  RestoredFolder::remove_old(path);
+  if (!arguments.restore) return nullptr;
+  auto folder = std::make_shared<RestoredFolder>(path, flight.source->camera());
+  flight.slam->restore_keyframes(
+      open_inpainter(arguments.models), [folder](const RestoredKeyframe& keyframe) {
+        folder->add(keyframe.frame, keyframe.view, time_text(keyframe.frame.timestamp));
+      });
+  return folder;
+}
+
+void end_restoration(Flight& flight, RestoredFolder& folder) {
+  flight.restored = folder.frames();
+  const nlohmann::ordered_json report{{"source", flight.description.source},
+                                      {"method", kInFlight},
+                                      {"frames", folder.frames()},
+                                      {"dropped", flight.slam->unrestored()},
+                                      {"faults", flight.slam->restoration_faults()}};
+  folder.close(report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
 }  // namespace
 
 Options options_of(const FlightArguments& arguments) {
@@ -111,33 +136,26 @@ Flight fly(const FlightArguments& arguments, Options options, const std::string&
   flight.slam = std::make_unique<Slam>(flight.source->camera(), options, mode, segmenter,
                                        open_vocabulary(arguments, options));
   if (map) flight.slam->continue_from(std::move(*map));
-  RestoredFolder::remove_old(folder.path() / "restored");
-  std::shared_ptr<RestoredFolder> restored;
-  if (arguments.restore) {
-    restored = std::make_shared<RestoredFolder>(folder.path() / "restored", flight.source->camera());
-    flight.slam->restore_keyframes(
-        open_inpainter(arguments.models), [restored](const RestoredKeyframe& keyframe) {
-          restored->add(keyframe.frame, keyframe.view, stamp(keyframe.frame.timestamp));
-        });
-  }
+  const auto restored = begin_restoration(flight, arguments, folder);
   std::optional<RemovalLog> log;
   RemovalLog::remove_old(folder.path());
   if (options.removal.is_on())
     log.emplace(RemovalLog::Settings{folder.path(), mode, flight.source->camera().fps, arguments.video});
   flight.summary = track(*flight.source, *flight.slam, log, arguments.quiet, stop);
-  std::exception_ptr log_failure;
-  try {
-    if (log) log->finish();
-  } catch (...) {
-    log_failure = std::current_exception();
-  }
+  // The results of the flight matter more than what goes with them.
+  std::exception_ptr failure;
+  const auto attempt = [&](const auto& step) {
+    try {
+      step();
+    } catch (...) {
+      if (!failure) failure = std::current_exception();
+    }
+  };
+  if (log) attempt([&] { log->finish(); });
+  if (restored) attempt([&] { end_restoration(flight, *restored); });
   if (log) flight.summary.removal = log->tally();
-  if (restored) {
-    restored->close();
-    flight.restored = restored->frames();
-  }
   folder.write(*flight.slam, flight.summary, *flight.source, flight.description);
-  if (log_failure) std::rethrow_exception(log_failure);
+  if (failure) std::rethrow_exception(failure);
   if (flight.summary.failure) std::rethrow_exception(flight.summary.failure);
   require_poses(*flight.slam, flight.summary, *flight.source, arguments.source.name);
   return flight;

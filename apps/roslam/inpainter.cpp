@@ -2,16 +2,34 @@
 #include "apps/roslam/inpainter.hpp"
 
 #include <iostream>
+#include <string>
+
+#include "roslam/error.hpp"
 
 namespace roslam::app {
 
-std::shared_ptr<Inpainter> open_inpainter(const std::filesystem::path& folder) {
+namespace {
+constexpr const char* kMissing = "models/roslam-restorer-*.onnx: not found beside the program";
+constexpr const char* kRemedy = "install them or name their folder with --models";
+
+std::shared_ptr<Inpainter> inpainter_in(const std::filesystem::path& folder) {
   const auto models = folder.empty() ? shipped_restoration_models() : folder;
-  if (!models.empty()) return std::make_shared<GanInpainter>(models);
-  std::cerr
-      << "note: models/roslam-restorer-*.onnx: not found beside the program; what nobody saw is painted by a "
-         "classic method. Install them or name their folder with --models\n";
-  return nullptr;
+  return models.empty() ? nullptr : std::make_shared<GanInpainter>(models);
+}
+}  // namespace
+
+std::shared_ptr<Inpainter> open_inpainter(const std::filesystem::path& folder) {
+  auto inpainter = inpainter_in(folder);
+  if (!inpainter)
+    std::cerr << "note: " << kMissing << "; what nobody saw is painted by a classic method; " << kRemedy
+              << "\n";
+  return inpainter;
+}
+
+std::shared_ptr<Inpainter> require_inpainter(const std::filesystem::path& folder) {
+  auto inpainter = inpainter_in(folder);
+  if (!inpainter) throw ModelError(std::string(kMissing) + "; " + kRemedy);
+  return inpainter;
 }
 
 }  // namespace roslam::app

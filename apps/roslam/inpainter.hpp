@@ -12,4 +12,7 @@ namespace roslam::app {
 /// Null, and a note on stderr, if it did not come with it. Throws ModelError.
 std::shared_ptr<Inpainter> open_inpainter(const std::filesystem::path& folder = {});
 
+/// The same, where nothing else will do: throws ModelError if it is not there.
+std::shared_ptr<Inpainter> require_inpainter(const std::filesystem::path& folder = {});
+
 }  // namespace roslam::app

@@ -41,7 +41,9 @@ class Measurement {
           "run");
       for (const auto& method : settings_.methods) result.results.push_back(measure_method(method));
       result.figure = draw();
-    } catch (const InputError& error) {
+    } catch (const OutputError&) {
+      throw;
+    } catch (const std::exception& error) {
       if (!stop_.stop_requested()) result.failure = error.what();
     }
     return result;
@@ -113,13 +115,16 @@ class Measurement {
     has_actor_masks_ = truth != nullptr;
     if (!truth) return false;
     make_folder(folder("actors"));
-    std::map<double, std::string> names;
-    for (const auto& picture : pictures_of(restored)) names[*picture.timestamp] = picture.name + ".png";
+    std::map<std::string, std::string> names;
+    for (const auto& picture : pictures_of(restored))
+      names[time_text(*picture.timestamp)] = picture.name + ".png";
     while (const auto frame = truth->next()) {
-      const auto name = names.find(frame->timestamp);
-      if (name == names.end() || !frame->truth) continue;
+      const auto name = names.find(time_text(frame->timestamp));
+      if (name == names.end()) continue;
+      cv::Mat hidden =
+          cv::Mat::zeros(frame->colour.size(), CV_8UC1);  // stays so where the truth cannot be read
       const cv::Mat provenance = read_label_image(restored / "provenance" / name->second).image;
-      cv::Mat hidden = frame->truth->actors & (provenance != 0);
+      if (frame->truth && !provenance.empty()) hidden = frame->truth->actors & (provenance != 0);
       write_picture(folder("actors") / name->second, hidden);
     }
     return true;
@@ -155,7 +160,7 @@ class Measurement {
 
   static cv::Mat picture_at(const std::vector<SequencePicture>& pictures, double timestamp) {
     for (const auto& picture : pictures)
-      if (picture.timestamp && std::abs(*picture.timestamp - timestamp) < 1e-5)
+      if (picture.timestamp && time_text(*picture.timestamp) == time_text(timestamp))
         return read_colour_image(picture.colour).image;
     return {};
   }

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/restoration_evaluation.hpp"
 
-#include <cmath>
+#include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "apps/roslam/progress.hpp"
 #include "apps/roslam/restoration_pictures.hpp"
 #include "roslam/error.hpp"
 #include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/trajectory.hpp"
 #include "roslam/semantics/label_set.hpp"
 #include "roslam/sources/image_file.hpp"
 
@@ -43,6 +45,13 @@ fs::path folder_of_masks(const RestorationEvaluationSettings& settings) {
 
 std::optional<double> depth_units_beside(const fs::path& folder) {
   std::error_code error;
+  // What people were composed into has units of its own.
+  if (fs::exists(folder / "background.txt", error)) {
+    const auto json = nlohmann::json::parse(std::ifstream(folder / "composition.json"), nullptr, false);
+    const char* key = "background_depth_units_per_metre";
+    if (!json.is_object() || !json.contains(key) || !json[key].is_number()) return std::nullopt;
+    return json[key].get<double>();
+  }
   if (!fs::is_regular_file(folder / "camera.yaml", error)) return std::nullopt;
   return read_camera(folder / "camera.yaml").depth_units_per_metre;
 }
@@ -59,13 +68,13 @@ class TruthIndex {
   explicit TruthIndex(std::vector<SequencePicture> pictures) : pictures_(std::move(pictures)) {
     for (const auto& picture : pictures_) {
       by_name_[picture.name] = &picture;
-      if (picture.timestamp) by_time_[microseconds(*picture.timestamp)] = &picture;
+      if (picture.timestamp) by_time_[time_text(*picture.timestamp)] = &picture;
     }
   }
 
   const SequencePicture* find(const SequencePicture& estimate) const {
     if (estimate.timestamp && !by_time_.empty()) {
-      const auto found = by_time_.find(microseconds(*estimate.timestamp));
+      const auto found = by_time_.find(time_text(*estimate.timestamp));
       return found == by_time_.end() ? nullptr : found->second;
     }
     const auto found = by_name_.find(estimate.name);
@@ -73,11 +82,9 @@ class TruthIndex {
   }
 
  private:
-  static long long microseconds(double time) { return std::llround(1e6 * time); }
-
   std::vector<SequencePicture> pictures_;
   std::map<std::string, const SequencePicture*> by_name_;
-  std::map<long long, const SequencePicture*> by_time_;
+  std::map<std::string, const SequencePicture*> by_time_;
 };
 
 cv::Mat movable_in(const cv::Mat& picture, Segmenter* segmenter) {
@@ -116,7 +123,8 @@ RestorationError evaluate_restoration(const RestorationEvaluationSettings& setti
     progress.show(i + 1, "compared");
   }
   RestorationError error = comparison.error();
-  if (settings.stop.stop_requested()) return error;
+  error.interrupted = settings.stop.stop_requested();
+  if (error.interrupted) return error;
   if (error.pictures == 0)
     throw InputError(settings.truth.string() + ": has no picture of the time or name of one in " +
                      settings.estimate.string());

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/restoration_pictures.hpp"
 
-#include "roslam/error.hpp"
+#include <algorithm>
+
 #include "roslam/sources/picture_source.hpp"
 #include "roslam/sources/tum_source.hpp"
 
@@ -10,19 +11,24 @@ namespace roslam::app {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr double kSameTime = 0.02;  // seconds between colour and depth
-
 bool is_file(const fs::path& file) {
   std::error_code error;
   return fs::is_regular_file(file, error);
 }
 
+std::vector<TimedFile> sorted_list(const fs::path& file) {
+  auto list = read_tum_list(file);
+  std::stable_sort(list.begin(), list.end(),
+                   [](const TimedFile& a, const TimedFile& b) { return a.timestamp < b.timestamp; });
+  return list;
+}
+
 // folder: that the files in the lists are relative to.
 std::vector<SequencePicture> listed(const fs::path& folder, const fs::path& colour_list,
                                     const fs::path& depth_list) {
-  const auto colour = read_tum_list(colour_list);
-  const auto depth = is_file(depth_list) ? read_tum_list(depth_list) : std::vector<TimedFile>{};
-  const auto depth_of = associate(colour, depth, kSameTime);
+  const auto colour = sorted_list(colour_list);
+  const auto depth = is_file(depth_list) ? sorted_list(depth_list) : std::vector<TimedFile>{};
+  const auto depth_of = associate(colour, depth, TumOptions{}.max_time_difference);
   std::vector<SequencePicture> pictures;
   for (std::size_t i = 0; i < colour.size(); ++i) {
     SequencePicture picture{colour[i].file.stem().string(), colour[i].timestamp, folder / colour[i].file, {}};
@@ -38,8 +44,6 @@ std::vector<SequencePicture> pictures_of(const fs::path& folder) {
   std::vector<SequencePicture> pictures;
   for (const auto& file : pictures_in(folder))
     pictures.push_back({file.stem().string(), std::nullopt, file, {}});
-  if (pictures.empty())
-    throw InputError(folder.string() + ": holds no pictures (PNG or JPEG) and no rgb.txt");
   return pictures;
 }
 

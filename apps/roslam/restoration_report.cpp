@@ -66,7 +66,8 @@ std::string restoration_markdown(const RestorationReport& report) {
        << ", " << report.cores << " cores. One frame in " << report.every
        << " was restored. Values are of what is inside the holes: PSNR, SSIM and absolute error (L1, grey "
           "levels) are "
-          "means over frames, depth errors medians over pixels. Time is of one core.\n";
+          "means over frames, depth errors medians over pixels. Reprojection alone leaves black what nobody "
+          "saw, and is scored with it. Time is of one core.\n";
   if (report.is_interrupted) text << "\nInterrupted: what was not complete is missing.\n";
   for (const auto& sequence : report.sequences) text << section(sequence);
   return text.str();

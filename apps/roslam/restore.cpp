@@ -35,14 +35,22 @@ struct RestoreArguments {
   FlightArguments flight;  // for what is not flown yet
   fs::path out;
   fs::path models;
-  std::string method = "both";
+  std::string method;     // empty: as the options say
   std::size_t every = 1;  // frame is restored
   bool json = false;
 };
 
 // The flight that a run recorded, from its beginning.
 std::unique_ptr<FrameSource> open_source_of(const RecordedRun& run) {
-  if (!run.flight().empty())
+  const bool is_simulated = run.source().starts_with("simulated:");
+  std::error_code error;
+  if (is_simulated ? run.flight().empty() : !fs::exists(run.source(), error)) {
+    throw InputError(
+        "the run is of " + run.source() +
+        (is_simulated ? ", but an earlier version did not note which flight it was; repeat the run"
+                      : ", which is not there; run roslam restore in the folder that roslam run was run in"));
+  }
+  if (is_simulated)
     return std::make_unique<SimulatedSource>(
         *simulated_flight(flight_from_words(run.source(), run.flight())));
   return std::make_unique<TumSource>(run.source(), run.camera());
@@ -50,15 +58,21 @@ std::unique_ptr<FrameSource> open_source_of(const RecordedRun& run) {
 
 std::string name_of_files(const FrameSource& source, const Frame& frame) {
   const auto* recording = dynamic_cast<const TumSource*>(&source);
-  return recording ? recording->colour_file(frame.index).stem().string() : stamp(frame.timestamp);
+  return recording ? recording->colour_file(frame.index).stem().string() : time_text(frame.timestamp);
 }
 
-std::shared_ptr<Inpainter> inpainter_for(const RestoreArguments& arguments) {
-  return arguments.method == "both" || arguments.method == "gan" ? open_inpainter(arguments.models) : nullptr;
+std::shared_ptr<Inpainter> inpainter_for(const RestoreArguments& arguments,
+                                         const RestorationOptions& options) {
+  if (arguments.method == "gan") return require_inpainter(arguments.models);
+  const bool is_wanted = options.invent && (arguments.method.empty() || arguments.method == "both");
+  return is_wanted ? open_inpainter(arguments.models) : nullptr;
 }
 
-StaticSceneRestorer::Settings settings_for(const RestoreArguments& arguments, const Options& options) {
+StaticSceneRestorer::Settings settings_for(const RestoreArguments& arguments, const RecordedRun& run) {
+  const bool has_config = !arguments.flight.config.empty();
+  const Options options = has_config ? read_options(arguments.flight.config) : run.removal().options();
   StaticSceneRestorer::Settings settings = options.restorer_settings();
+  if (arguments.method.empty()) return settings;
   settings.restoration.reproject = arguments.method == "both" || arguments.method == "reprojection";
   settings.restoration.invent = arguments.method != "reprojection";
   if (arguments.method == "navier-stokes") settings.invention.classic = ClassicMethod::kNavierStokes;
@@ -77,60 +91,56 @@ fs::path run_folder_of(const RestoreArguments& arguments, const std::string& ver
 }
 
 struct Restored {
-  std::size_t sources = 0;
   std::vector<double> milliseconds;  // processor time, of frames with holes
   std::map<std::string, std::size_t> left_out;
-  bool interrupted = false;
 };
 
-Restored restore_all(const RecordedRun& run, StaticSceneRestorer& restorer, RestoredFolder& folder,
-                     std::size_t every, bool quiet, const std::stop_token& stop) {
-  Restored restored;
-  SequenceRestorer sequence(run, restorer);
-  const auto first_pass = open_source_of(run);
-  {
-    Progress progress(first_pass->size(), quiet);
-    while (!stop.stop_requested()) {
-      const auto frame = first_pass->next();
-      if (!frame) break;
-      if (sequence.is_source(frame->timestamp)) sequence.keep(*frame);
-      progress.show(frame->index + 1, "looked through");
-    }
-  }
-  const auto second_pass = open_source_of(run);
-  Progress progress(second_pass->size(), quiet);
+void keep_sources(SequenceRestorer& sequence, FrameSource& source, bool quiet, const std::stop_token& stop) {
+  Progress progress(source.size(), quiet);
   while (!stop.stop_requested()) {
-    const auto frame = second_pass->next();
+    const auto frame = source.next();
+    if (!frame) return;
+    if (sequence.is_source(frame->timestamp)) sequence.keep(*frame);
+    progress.show(frame->index + 1, "looked through");
+  }
+}
+
+Restored restore_all(SequenceRestorer& sequence, FrameSource& source, RestoredFolder& folder,
+                     const RestoreArguments& arguments, const std::stop_token& stop) {
+  Restored restored;
+  Progress progress(source.size(), arguments.flight.quiet);
+  while (!stop.stop_requested()) {
+    const auto frame = source.next();
     if (!frame) break;
-    if (frame->index % every != 0) continue;
+    if (frame->index % arguments.every != 0) continue;
     const Stopwatch watch;
     const auto view = sequence.restore(*frame);
     if (view) {
       if (view->pixels_of(Provenance::kMeasured) < view->colour.total())
         restored.milliseconds.push_back(1000.0 * watch.seconds());
-      folder.add(*frame, *view, name_of_files(*second_pass, *frame));
+      folder.add(*frame, *view, name_of_files(source, *frame));
     }
     progress.show(frame->index + 1, "restored");
   }
-  restored.interrupted = stop.stop_requested();
-  restored.sources = sequence.sources();
   restored.left_out = sequence.left_out();
+  for (const auto& [reason, count] : source.skipped()) restored.left_out[reason] += count;
   return restored;
 }
 
 Json report_of(const RestoreArguments& arguments, const RecordedRun& run, const RestoredFolder& folder,
-               const Restored& restored) {
+               const Restored& restored, std::size_t sources, bool has_network, bool interrupted) {
   const auto hole = static_cast<double>(folder.reprojected() + folder.invented());
   const auto share = [&](std::size_t pixels) {
     return hole > 0.0 ? Json(static_cast<double>(pixels) / hole) : Json(nullptr);
   };
   return {{"source", run.source()},
           {"out", arguments.out.string()},
-          {"method", arguments.method},
-          {"interrupted", restored.interrupted},
+          {"method", arguments.method.empty() ? "both" : arguments.method},
+          {"network", has_network},
+          {"interrupted", interrupted},
           {"frames", folder.frames()},
           {"left_out", restored.left_out},
-          {"frames_filled_from", restored.sources},
+          {"frames_filled_from", sources},
           {"hole_share", hole / std::max(1.0, hole + static_cast<double>(folder.measured()))},
           {"reprojected_share_of_hole", share(folder.reprojected())},
           {"invented_share_of_hole", share(folder.invented())},
@@ -157,19 +167,27 @@ void print(const Json& report) {
 
 void restore(RestoreArguments arguments, const std::string& version) {
   const InterruptWatcher interrupt;
+  const std::stop_token stop = interrupt.token();
   arguments.flight.quiet |= arguments.json;
   RestoredFolder::require_usable(arguments.out);
-  const RecordedRun run(run_folder_of(arguments, version, interrupt.token()));
-  StaticSceneRestorer restorer(run.camera(), settings_for(arguments, run.removal().options()),
-                               inpainter_for(arguments));
+  RestoredFolder::require_apart(arguments.out, arguments.flight.source.name);
+  const RecordedRun run(run_folder_of(arguments, version, stop));
+  RestoredFolder::require_apart(arguments.out, run.source());
+  const auto settings = settings_for(arguments, run);
+  const auto inpainter = inpainter_for(arguments, settings.restoration);
+  StaticSceneRestorer restorer(run.camera(), settings, inpainter);
+  SequenceRestorer sequence(run, restorer);
+  keep_sources(sequence, *open_source_of(run), arguments.flight.quiet, stop);
+  if (stop.stop_requested()) {  // what an earlier run restored stays
+    std::cerr << "interrupted before anything was restored\n";
+    return;
+  }
   RestoredFolder folder(arguments.out, run.camera());
-  const Restored restored =
-      restore_all(run, restorer, folder, arguments.every, arguments.flight.quiet, interrupt.token());
-  folder.close();
-  const Json report = report_of(arguments, run, folder, restored);
-  write_file(arguments.out / "restoration.json",
-             report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
-  if (folder.frames() == 0 && !restored.interrupted)
+  const Restored restored = restore_all(sequence, *open_source_of(run), folder, arguments, stop);
+  const Json report = report_of(arguments, run, folder, restored, sequence.sources(), inpainter != nullptr,
+                                stop.stop_requested());
+  folder.close(report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  if (folder.frames() == 0 && !stop.stop_requested())
     throw InputError(run.source() + ": no frame could be restored" + in_words(restored.left_out) +
                      "; is it what the run flew?");
   if (arguments.json) {
@@ -178,6 +196,13 @@ void restore(RestoreArguments arguments, const std::string& version) {
     print(report);
   }
   require_written_output();
+}
+
+// What the run knows cannot be told it once more.
+void require_no_flight_options(const CLI::App& command) {
+  for (const char* name :
+       {"--camera", "--traffic", "--frames", "--seed", "--speed", "--altitude", "--aside", "--gain"})
+    if (command.count(name) > 0) throw CLI::ValidationError(name, "is known from the run; leave it out");
 }
 }  // namespace
 
@@ -201,10 +226,10 @@ void add_restore_command(CLI::App& program, const std::string& version) {
       ->required();
   command
       ->add_option("--method", arguments->method,
-                   "both, or one alone to compare: reprojection (leaves black what nobody saw), gan, telea "
+                   "both (default, or as the options say), or one alone to compare: reprojection (leaves "
+                   "black what nobody saw), gan, telea "
                    "or navier-stokes (OpenCV's)")
-      ->check(CLI::IsMember({"both", "reprojection", "gan", "telea", "navier-stokes"}))
-      ->capture_default_str();
+      ->check(CLI::IsMember({"both", "reprojection", "gan", "telea", "navier-stokes"}));
   command->add_option(
       "--models", arguments->models,
       "Folder with roslam-restorer-person.onnx and so on, in place of those that come with the program");
@@ -214,11 +239,14 @@ void add_restore_command(CLI::App& program, const std::string& version) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_option("--config", arguments->flight.config,
-                      "YAML file with options of the flight, where it is not flown yet");
+                      "YAML file with options; default those of the run");
   add_flight_options(*command, arguments->flight.source);
   command->add_flag("--quiet", arguments->flight.quiet, "No progress");
   command->add_flag("--json", arguments->json, "Print the summary as one JSON object");
-  command->callback([arguments, version] { restore(*arguments, version); });
+  command->callback([arguments, command, version] {
+    if (RecordedRun::recognises(arguments->flight.source.name)) require_no_flight_options(*command);
+    restore(*arguments, version);
+  });
 }
 
 }  // namespace roslam::app

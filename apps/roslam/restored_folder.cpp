@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/restored_folder.hpp"
 
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -18,16 +21,28 @@ namespace fs = std::filesystem;
 constexpr std::size_t kPictures = 6;  // of before and after; twice as many are kept until the end
 constexpr int kPictureWidth = 1200;   // pixels
 constexpr const char* kProvenance = "provenance";
+constexpr const char* kReport = "restoration.json";
+
+void remove_left(const fs::path& path) {
+  std::error_code error;
+  fs::remove_all(path, error);
+  if (error)
+    throw OutputError(path.string() + ": left by an earlier run and cannot be removed; choose another --out");
+}
 
 fs::path made(const fs::path& folder) {
   RestoredFolder::require_usable(folder);
   make_folder(folder);
-  std::error_code error;
-  for (const char* name : {"rgb", "depth", kProvenance}) {
-    fs::remove_all(folder / name, error);
-    make_folder(folder / name);
-  }
+  for (const char* name : {"rgb", "depth", kProvenance, "before_after.jpg", "depth.txt"})
+    remove_left(folder / name);
+  for (const char* name : {"rgb", "depth", kProvenance}) make_folder(folder / name);
+  write_file(folder / kReport, "{}\n");
   return folder;
+}
+
+bool lies_in(const fs::path& inner, const fs::path& outer) {
+  const auto [end, at] = std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end());
+  return end == outer.end();
 }
 }  // namespace
 
@@ -40,32 +55,40 @@ RestoredFolder::RestoredFolder(fs::path folder, const Camera& camera)
 
 void RestoredFolder::require_usable(const fs::path& folder) {
   std::error_code error;
-  if (fs::exists(folder / kProvenance, error)) return;
-  for (const char* name : {"rgb.txt", "rgb", "depth", "run.json"}) {
+  if (fs::exists(folder / kReport, error)) return;
+  for (const char* name : {"rgb.txt", "rgb", "depth", kProvenance, "run.json"}) {
     if (fs::exists(folder / name, error))
       throw OutputError(folder.string() +
                         ": holds a dataset or a run, which the result could replace; choose another --out");
   }
 }
 
-void RestoredFolder::remove_old(const fs::path& folder) {
+void RestoredFolder::require_apart(const fs::path& folder, const fs::path& source) {
   std::error_code error;
-  if (!fs::exists(folder / kProvenance, error)) return;
-  fs::remove_all(folder, error);
-  if (error)
-    throw OutputError(folder.string() +
-                      ": left by an earlier run and cannot be removed; choose another --out");
+  const fs::path to = fs::weakly_canonical(folder, error);
+  const fs::path from = fs::weakly_canonical(source, error);
+  const bool is_same = to == from;
+  const bool is_part =
+      lies_in(from, to / "rgb") || lies_in(from, to / "depth") || lies_in(from, to / kProvenance);
+  if (is_same || is_part)
+    throw OutputError(folder.string() + ": holds the frames that are to be restored; choose another --out");
+}
+
+void RestoredFolder::remove_old(const fs::path& folder) {
+  const auto report = nlohmann::json::parse(std::ifstream(folder / kReport), nullptr, false);
+  if (report.is_object() && report.value("method", "") == kInFlight) remove_left(folder);
 }
 
 void RestoredFolder::add(const Frame& frame, const RestoredView& restored, const std::string& name) {
-  const std::string file = name + ".png";
-  const std::string time = stamp(frame.timestamp);
+  const std::string time = time_text(frame.timestamp);
+  const std::string file = (names_.insert(name).second ? name : time) + ".png";
   write_picture(folder_ / "rgb" / file, restored.colour);
   write_picture(folder_ / kProvenance / file, restored.provenance);
   colours_.line(time + " rgb/" + file);
   if (!restored.depth.empty()) {
     write_picture(folder_ / "depth" / file, packed_depth(restored.depth, camera_.depth_units_per_metre));
     depths_.line(time + " depth/" + file);
+    has_depth_ = true;
   }
   ++frames_;
   pixels_ += restored.colour.total();
@@ -88,9 +111,14 @@ void RestoredFolder::keep_picture(const Frame& frame, const RestoredView& restor
   stride_ *= 2;
 }
 
-void RestoredFolder::close() {
+void RestoredFolder::close(const std::string& report) {
   colours_.close();
   depths_.close();
+  if (!has_depth_) {
+    remove_left(folder_ / "depth.txt");
+    remove_left(folder_ / "depth");
+  }
+  write_file(folder_ / kReport, report);
   if (pictures_.empty()) return;
   std::vector<cv::Mat> chosen;
   const std::size_t count = std::min(kPictures, pictures_.size());

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <opencv2/core.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,9 @@
 #include "roslam/sources/frame_source.hpp"
 
 namespace roslam::app {
+
+/// The method in restoration.json of keyframes that were restored in flight.
+inline constexpr const char* kInFlight = "in flight";
 
 /// A sequence without its moving things in the TUM format, and beside it where each pixel comes from.
 class RestoredFolder {
@@ -24,15 +28,20 @@ class RestoredFolder {
   /// Throws OutputError if a folder holds pictures of other origin or a run.
   static void require_usable(const std::filesystem::path& folder);
 
-  /// Removes what an earlier run restored, so that it does not pass for the result of a later one. Throws
-  /// OutputError.
+  /// Removes what `run --restore` left in an earlier run, so that it does not pass for the result of a later
+  /// one. Throws OutputError.
   static void remove_old(const std::filesystem::path& folder);
 
-  /// name: of the frame's files, without ending. Throws OutputError.
+  /// Throws OutputError if frames of a source lie in what the folder's files would replace.
+  static void require_apart(const std::filesystem::path& folder, const std::filesystem::path& source);
+
+  /// name: of the frame's files, without ending; of a name that was there before the time is taken. Throws
+  /// OutputError.
   void add(const Frame& frame, const RestoredView& restored, const std::string& name);
 
-  /// Writes what is still held back and, if there are any, pictures of before and after. Throws OutputError.
-  void close();
+  /// Writes what is still held back and, if there are any, pictures of before and after. report: the contents
+  /// of restoration.json, by which the folder is known for ours. Throws OutputError.
+  void close(const std::string& report);
 
   std::size_t frames() const { return frames_; }
 
@@ -47,6 +56,8 @@ class RestoredFolder {
   std::filesystem::path folder_;
   Camera camera_;
   TextFile colours_, depths_;
+  std::set<std::string> names_;
+  bool has_depth_ = false;
   std::size_t frames_ = 0;
   std::size_t pixels_ = 0, reprojected_ = 0, invented_ = 0;
   std::vector<cv::Mat> pictures_;

@@ -79,6 +79,12 @@ void check(const FlightArguments& arguments, const Options& options) {
   if (!arguments.vocabulary.empty() && !options.loop.enabled) {
     throw CLI::ValidationError("--vocabulary", "needs loop.enabled");
   }
+  if (!arguments.models.empty() && !arguments.restore)
+    throw CLI::ValidationError("--models", "needs --restore");
+  if (arguments.restore && !options.keyframes.enabled)
+    throw CLI::ValidationError("--restore", "restores keyframes, of which --localise-only makes none");
+  if (arguments.restore && !options.removal.is_on())
+    throw CLI::ValidationError("--restore", "has nothing to restore with --dynamic none");
   if (!options.keyframes.enabled && arguments.map.empty()) {
     throw CLI::ValidationError("--localise-only", "needs --map, a map to find the camera in");
   }

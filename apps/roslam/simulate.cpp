@@ -89,7 +89,7 @@ void simulate(const SimulateArguments& arguments) {
   Progress progress(simulator.size());
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     const SimulatedView view = simulator.render(i, SimulatedParts::kBackground);
-    const std::string time = stamp(view.frame.timestamp);
+    const std::string time = time_text(view.frame.timestamp);
     write_images(arguments.out, time + ".png", view, simulator.camera());
     colours.line(time + " rgb/" + time + ".png");
     depths.line(time + " depth/" + time + ".png");

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "roslam/error.hpp"
 #include "roslam/sources/simulated_source.hpp"
@@ -93,7 +94,10 @@ SourceArguments flight_from_words(const std::string& name, const std::map<std::s
     const auto found = words.find(key);
     if (found == words.end()) return;
     std::istringstream text(found->second);
-    if (!(text >> value))
+    const bool is_number = (text >> value) && text.peek() == std::istringstream::traits_type::eof();
+    const bool is_negative =
+        std::is_unsigned_v<std::decay_t<decltype(value)>> && found->second.starts_with('-');
+    if (!is_number || is_negative)
       throw InputError(name + ": " + key + " of the flight is no number: " + found->second);
   };
   take("traffic", arguments.traffic);

@@ -2,19 +2,12 @@
 #include "apps/roslam/tum_writer.hpp"
 
 #include <cstdint>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
 #include "roslam/error.hpp"
 
 namespace roslam::app {
-
-std::string stamp(double timestamp) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.6f", timestamp);
-  return text;
-}
 
 cv::Mat packed_depth(const cv::Mat& depth, double units_per_metre) {
   constexpr double kLargest = std::numeric_limits<std::uint16_t>::max();

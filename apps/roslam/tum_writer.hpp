@@ -6,10 +6,9 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
-namespace roslam::app {
+#include "roslam/geometry/trajectory.hpp"
 
-/// A time in seconds as lists and file names of the TUM format give it: six decimals.
-std::string stamp(double timestamp);
+namespace roslam::app {
 
 /// Depth in metres (CV_32FC1, 0 = unknown) as a 16-bit image. What does not fit becomes unknown.
 cv::Mat packed_depth(const cv::Mat& depth, double units_per_metre);

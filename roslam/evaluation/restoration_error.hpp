@@ -28,6 +28,7 @@ class DepthErrorHistogram {
 
 /// How close what fills the holes comes to what is there. Values are NaN where there is nothing to tell.
 struct RestorationError {
+  bool interrupted = false;   ///< pictures are missing at the end
   std::size_t pictures = 0;   ///< compared
   std::size_t with_hole = 0;  ///< of them with a hole of at least 100 pixels, which alone are scored
   std::uint64_t pixels = 0;   ///< of those pictures

@@ -35,12 +35,13 @@ std::string to_markdown(const RestorationError& e) {
        percent(share(static_cast<double>(e.matched_points), static_cast<double>(e.true_points)))},
       {"invented pixels taken for what may move", percent(e.movable_share)},
   };
-  return markdown_table(rows);
+  return (e.interrupted ? "Interrupted: of the pictures compared so far\n\n" : "") + markdown_table(rows);
 }
 
 std::string to_json(const RestorationError& e) {
   const auto hole = static_cast<double>(e.hole_pixels);
   const nlohmann::ordered_json json{
+      {"interrupted", e.interrupted},
       {"pictures", e.pictures},
       {"pictures_with_hole", e.with_hole},
       {"hole_share", number(share(hole, static_cast<double>(e.pixels)))},

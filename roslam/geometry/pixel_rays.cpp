@@ -14,6 +14,8 @@ PixelRays::PixelRays(const Camera& camera)
     : camera_(camera),
       rays_(camera.height, camera.width, CV_32FC2),
       has_distortion_(camera.has_distortion()) {
+  low_.setConstant(std::numeric_limits<float>::max());
+  high_ = -low_;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       const Eigen::Vector2d pixel(x, y);
@@ -23,11 +25,11 @@ PixelRays::PixelRays(const Camera& camera)
       rays_.at<cv::Vec2f>(y, x) = is_known
                                       ? cv::Vec2f(static_cast<float>(ray.x()), static_cast<float>(ray.y()))
                                       : cv::Vec2f::all(std::numeric_limits<float>::quiet_NaN());
+      if (!is_known) continue;
+      low_ = low_.cwiseMin(ray.head<2>().cast<float>());
+      high_ = high_.cwiseMax(ray.head<2>().cast<float>());
     }
   }
-  const auto bounds = camera.undistorted_bounds();
-  low_ = camera.unproject({bounds[0], bounds[1]}, 1.0).head<2>().cast<float>();
-  high_ = camera.unproject({bounds[2], bounds[3]}, 1.0).head<2>().cast<float>();
 }
 
 std::optional<Eigen::Vector2f> PixelRays::pixel(const Eigen::Vector3f& point) const {

@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -16,6 +17,12 @@
 #include "roslam/write_file.hpp"
 
 namespace roslam {
+
+std::string time_text(double timestamp) {
+  char text[400];  // the largest double has 309 digits before the point
+  std::snprintf(text, sizeof(text), "%.6f", timestamp);
+  return text;
+}
 
 namespace {
 constexpr std::size_t kColumns = 8;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "roslam/geometry/se3.hpp"
@@ -17,6 +18,10 @@ struct StampedPose {
 
 /// Poses in the order of time.
 using Trajectory = std::vector<StampedPose>;
+
+/// A time in seconds as files and file names hold it: six decimals. Times of the same text are the same
+/// moment.
+std::string time_text(double timestamp);
 
 /// The pose at a time, interpolated between the poses before and after it; nothing outside the trajectory and
 /// where those two are more than max_gap seconds apart.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/pipeline/recorded_removal.hpp"
 
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -33,11 +34,18 @@ Options read_options_of_run(const fs::path& file) {
 // Throws Json::exception for what is no whole number from 0.
 std::size_t count_from(const Json& value) { return value.get_ref<const Json::number_unsigned_t&>(); }
 
+// A number of pixels. Throws Json::exception for what no picture has.
+int pixels_from(const Json& value) {
+  constexpr double kMost = 1e6;
+  const double number = value.get<double>();
+  return std::abs(number) <= kMost ? static_cast<int>(number) : Json().get<int>();  // which throws
+}
+
 RemovedRegion region_from(const Json& object) {
   const Json& box = object.at("box");
   const auto kind = movable_from(object.at("class").get_ref<const std::string&>());
-  return {kind.value_or(Movable::kUnknown), square_around({box.at(0).get<int>(), box.at(1).get<int>(),
-                                                           box.at(2).get<int>(), box.at(3).get<int>()})};
+  return {kind.value_or(Movable::kUnknown), square_around({pixels_from(box.at(0)), pixels_from(box.at(1)),
+                                                           pixels_from(box.at(2)), pixels_from(box.at(3))})};
 }
 
 struct Line {

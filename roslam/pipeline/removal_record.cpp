@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "roslam/removal/auxiliary_descriptor.hpp"
@@ -90,9 +89,7 @@ std::string descriptor_line(const FrameResult& result, const cv::Size& picture, 
 }
 
 std::string mask_name(double timestamp) {
-  char name[400];  // the largest double has 309 digits before the point
-  std::snprintf(name, sizeof(name), "%s/%.6f.png", kMaskFolder, timestamp);
-  return name;
+  return std::string(kMaskFolder) + "/" + time_text(timestamp) + ".png";
 }
 
 cv::Mat object_image(const std::vector<MovableObject>& objects, const cv::Size& picture) {

@@ -20,12 +20,13 @@ cv::Mat removed_from(const Frame& frame, const Removal& removal, int margin) {
 }  // namespace
 
 RestorationWorker::RestorationWorker(const Camera& camera, const Options& options, Mode mode,
-                                     std::shared_ptr<Inpainter> inpainter, PlaceOf place_of,
+                                     std::shared_ptr<Inpainter> inpainter, PlacesOf places_of,
                                      OnRestored on_restored)
     : options_(options.restoration),
       mode_(mode),
+      most_sources_(sources_that_fit(options.restoration.recent_sources, camera)),
       restorer_(camera, options.restorer_settings(), std::move(inpainter)),
-      place_of_(std::move(place_of)),
+      places_of_(std::move(places_of)),
       on_restored_(std::move(on_restored)),
       worker_([this](KeyframeId keyframe, const auto&, StageTimes& times) { work(keyframe, times); }, mode,
               1) {}
@@ -71,23 +72,36 @@ void RestorationWorker::work(KeyframeId keyframe, StageTimes& times) {
 }
 
 void RestorationWorker::restore(KeyframeId keyframe, const Job& job) {
-  const Placed placed = place_of_(keyframe);
+  std::vector<KeyframeId> ids;
+  for (const auto& [id, source] : sources_) ids.push_back(id);
+  ids.push_back(keyframe);
+  const std::vector<Placed> places = places_of_(ids);
+  const auto sources = move_sources(ids, places);
+  const Placed& placed = places.back();
   const View view{job.frame.timestamp, placed.T_world_camera, job.frame.colour, job.frame.depth,
                   removed_from(job.frame, job.removal, options_.margin)};
-  on_restored_({keyframe, job.frame, placed.T_world_camera, placed.world,
-                restorer_.restore(view, regions_of(job.removal.objects), sources_in(placed.world))});
-  if (auto source = restorer_.source_view(view)) sources_.insert_or_assign(keyframe, std::move(*source));
-  while (sources_.size() > static_cast<std::size_t>(options_.recent_sources))
-    sources_.erase(sources_.begin());
+  const auto keep = [&] {
+    if (auto source = restorer_.source_view(view)) sources_.insert_or_assign(keyframe, std::move(*source));
+    while (sources_.size() > most_sources_) sources_.erase(sources_.begin());
+  };
+  try {
+    on_restored_({keyframe, job.frame, placed.T_world_camera, placed.world,
+                  restorer_.restore(view, regions_of(job.removal.objects), sources)});
+  } catch (...) {
+    keep();  // others can be filled from it all the same
+    throw;
+  }
+  keep();
 }
 
-// Those before, where they are by now.
-std::vector<const SourceView*> RestorationWorker::sources_in(WorldId world) {
+// Puts the sources where they are by now. Those in the world of the last place, which is that of the target.
+std::vector<const SourceView*> RestorationWorker::move_sources(const std::vector<KeyframeId>& ids,
+                                                               const std::vector<Placed>& places) {
   std::vector<const SourceView*> result;
-  for (auto& [keyframe, source] : sources_) {
-    const Placed placed = place_of_(keyframe);
-    if (placed.world != world) continue;
-    source.T_world_camera = placed.T_world_camera;
+  for (std::size_t i = 0; i + 1 < ids.size(); ++i) {
+    if (places[i].world != places.back().world) continue;
+    SourceView& source = sources_.at(ids[i]);
+    source.T_world_camera = places[i].T_world_camera;
     result.push_back(&source);
   }
   return result;

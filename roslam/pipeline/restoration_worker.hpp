@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "roslam/map/ids.hpp"
 #include "roslam/pipeline/keyframe_worker.hpp"
@@ -36,14 +37,14 @@ class RestorationWorker {
     WorldId world;
     SE3 T_world_camera;
   };
-  /// Where a keyframe is by now. Called on the worker's thread.
-  using PlaceOf = std::function<Placed(KeyframeId)>;
+  /// Where keyframes are by now, all at one moment. Called on the worker's thread.
+  using PlacesOf = std::function<std::vector<Placed>(const std::vector<KeyframeId>&)>;
   /// Takes what was restored, on the worker's thread.
   using OnRestored = std::function<void(const RestoredKeyframe&)>;
 
   /// inpainter: as StaticSceneRestorer. Throws as StaticSceneRestorer does.
   RestorationWorker(const Camera& camera, const Options& options, Mode mode,
-                    std::shared_ptr<Inpainter> inpainter, PlaceOf place_of, OnRestored on_restored);
+                    std::shared_ptr<Inpainter> inpainter, PlacesOf places_of, OnRestored on_restored);
 
   /// The images of the frame must not be changed afterwards.
   void submit(KeyframeId keyframe, const Frame& frame, const Removal& removal);
@@ -66,12 +67,14 @@ class RestorationWorker {
 
   void work(KeyframeId keyframe, StageTimes& times);
   void restore(KeyframeId keyframe, const Job& job);
-  std::vector<const SourceView*> sources_in(WorldId world);
+  std::vector<const SourceView*> move_sources(const std::vector<KeyframeId>& ids,
+                                              const std::vector<Placed>& places);
 
   RestorationOptions options_;
   Mode mode_;
+  std::size_t most_sources_;
   StaticSceneRestorer restorer_;
-  PlaceOf place_of_;
+  PlacesOf places_of_;
   OnRestored on_restored_;
   std::map<KeyframeId, SourceView> sources_;  // by the worker's thread
 

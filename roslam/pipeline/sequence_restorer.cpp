@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/pipeline/sequence_restorer.hpp"
 
-#include <cmath>
-
 #include "roslam/error.hpp"
 #include "roslam/removal/mask_refinement.hpp"
 #include "roslam/sources/image_file.hpp"
@@ -10,22 +8,19 @@
 namespace roslam {
 
 namespace {
-// Files hold times with six decimals.
-long long microseconds(double timestamp) { return std::llround(1e6 * timestamp); }
-
 // Keyframes, and between them what leaves no longer gap than the interval; thinned if they are too many.
-std::set<long long> times_of_sources(const RecordedRun& run, const RestorationOptions& options) {
-  std::set<long long> keyframes;
-  for (const StampedPose& pose : run.keyframes()) keyframes.insert(microseconds(pose.timestamp));
+std::set<std::string> times_of_sources(const RecordedRun& run, const RestorationOptions& options) {
+  std::set<std::string> keyframes;
+  for (const StampedPose& pose : run.keyframes()) keyframes.insert(time_text(pose.timestamp));
   std::vector<double> times;
   for (const StampedPose& pose : run.trajectory()) {
     const bool is_due = times.empty() || pose.timestamp - times.back() >= options.source_interval;
-    if (is_due || keyframes.contains(microseconds(pose.timestamp))) times.push_back(pose.timestamp);
+    if (is_due || keyframes.contains(time_text(pose.timestamp))) times.push_back(pose.timestamp);
   }
-  const std::size_t limit = static_cast<std::size_t>(options.max_sources);
+  const std::size_t limit = sources_that_fit(options.max_sources, run.camera());
   const std::size_t stride = (times.size() + limit - 1) / limit;
-  std::set<long long> result;
-  for (std::size_t i = 0; i < times.size(); i += stride) result.insert(microseconds(times[i]));
+  std::set<std::string> result;
+  for (std::size_t i = 0; i < times.size(); i += stride) result.insert(time_text(times[i]));
   return result;
 }
 }  // namespace
@@ -37,7 +32,7 @@ SequenceRestorer::SequenceRestorer(const RecordedRun& run, StaticSceneRestorer& 
       source_times_(times_of_sources(run, options_)) {}
 
 bool SequenceRestorer::is_source(double timestamp) const {
-  return source_times_.contains(microseconds(timestamp));
+  return source_times_.contains(time_text(timestamp));
 }
 
 // Nothing, and why, if it is not known what was removed from the frame.

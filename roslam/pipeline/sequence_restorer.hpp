@@ -41,7 +41,7 @@ class SequenceRestorer {
   const RecordedRun& run_;
   StaticSceneRestorer& restorer_;
   RestorationOptions options_;
-  std::set<long long> source_times_;  // microseconds
+  std::set<std::string> source_times_;  // as time_text
   std::vector<std::unique_ptr<const SourceView>> sources_;
   std::map<std::string, std::size_t> left_out_;
 };

@@ -65,18 +65,6 @@ void Slam::continue_from(SavedMap saved) {
   map_.begin_flight();
 }
 
-void Slam::restore_keyframes(std::shared_ptr<Inpainter> inpainter,
-                             RestorationWorker::OnRestored on_restored) {
-  restoration_.emplace(
-      camera_, options_, mode_, std::move(inpainter),
-      [this](KeyframeId keyframe) { return place_of(keyframe); }, std::move(on_restored));
-}
-
-RestorationWorker::Placed Slam::place_of(KeyframeId keyframe) {
-  const std::scoped_lock lock(map_mutex_);
-  return {map_.world_of(keyframe), map_.T_camera_world(keyframe).inverse()};
-}
-
 void Slam::map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,
                         StageTimes& times) {
   // The next keyframe matters more than the last step of refining this one.

@@ -128,7 +128,7 @@ class Slam {
   void map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   void close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   std::vector<KeyframeId> similar_keyframes(const ObservedFrame& view) const;
-  RestorationWorker::Placed place_of(KeyframeId keyframe);
+  std::vector<RestorationWorker::Placed> places_of(const std::vector<KeyframeId>& keyframes);
   void follow_correction();
   void follow_world(const TrackedFrame& frame);
   std::map<WorldId, std::size_t> frames_by_world() const;

@@ -6,6 +6,21 @@
 
 namespace roslam {
 
+void Slam::restore_keyframes(std::shared_ptr<Inpainter> inpainter,
+                             RestorationWorker::OnRestored on_restored) {
+  restoration_.emplace(
+      camera_, options_, mode_, std::move(inpainter),
+      [this](const auto& keyframes) { return places_of(keyframes); }, std::move(on_restored));
+}
+
+std::vector<RestorationWorker::Placed> Slam::places_of(const std::vector<KeyframeId>& keyframes) {
+  const std::scoped_lock lock(map_mutex_);
+  std::vector<RestorationWorker::Placed> places;
+  for (const KeyframeId id : keyframes)
+    places.push_back({map_.world_of(id), map_.T_camera_world(id).inverse()});
+  return places;
+}
+
 SavedMap Slam::snapshot() const { return SavedMap::of(camera_, map_, places_ ? &*places_ : nullptr); }
 
 std::vector<ClosedLoop> Slam::loops() const {

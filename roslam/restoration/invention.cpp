@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/photo.hpp>
 #include <string>
@@ -24,7 +25,6 @@ void InventionOptions::validate() const {
 }
 
 namespace {
-constexpr int kRim = 12;              // pixels around a hole along which paint and picture are compared
 constexpr double kClassicRadius = 5;  // pixels that a classic method looks at
 
 cv::Mat ellipse(int side) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}); }
@@ -33,28 +33,30 @@ cv::Rect grown(const cv::Rect& box, int by) {
   return {box.x - by, box.y - by, box.width + 2 * by, box.height + 2 * by};
 }
 
-// Parts of the hole that are painted together, the largest first.
+// A part of the hole that is painted at once.
 struct Part {
   cv::Rect box;
   cv::Mat hole;  // CV_8UC1 of the picture's size
-  int pixels = 0;
 };
 
+// The largest parts of the hole that lie apart.
 std::vector<Part> parts_of(const cv::Mat& hole, const InventionOptions& options) {
-  cv::Mat wide, joined, labels;
+  cv::Mat wide, joined, labels, stats, centroids;
   cv::morphologyEx(hole, wide, cv::MORPH_OPEN, ellipse(options.min_width));
   cv::dilate(wide, joined, ellipse(options.joined_within + 1));
-  const int count = cv::connectedComponents(joined, labels);
+  std::vector<int> numbers(
+      static_cast<std::size_t>(cv::connectedComponentsWithStats(joined, labels, stats, centroids)));
+  std::iota(numbers.begin(), numbers.end(), 0);
+  numbers.erase(numbers.begin());  // what lies around
+  std::stable_sort(numbers.begin(), numbers.end(), [&](int a, int b) {
+    return stats.at<int>(a, cv::CC_STAT_AREA) > stats.at<int>(b, cv::CC_STAT_AREA);
+  });
+  numbers.resize(std::min(numbers.size(), static_cast<std::size_t>(options.max_crops)));
   std::vector<Part> parts;
-  for (int i = 1; i < count; ++i) {
-    Part part{{}, (labels == i) & hole, 0};
-    part.box = cv::boundingRect(part.hole);
-    part.pixels = cv::countNonZero(part.hole);
-    parts.push_back(std::move(part));
+  for (const int number : numbers) {
+    const cv::Mat part = (labels == number) & hole;
+    parts.push_back({cv::boundingRect(part), part});
   }
-  std::stable_sort(parts.begin(), parts.end(),
-                   [](const Part& a, const Part& b) { return a.pixels > b.pixels; });
-  parts.resize(std::min(parts.size(), static_cast<std::size_t>(options.max_crops)));
   return parts;
 }
 
@@ -84,7 +86,7 @@ void paint_part(cv::Mat& picture, const cv::Mat& hole, const Part& part, Movable
 
   const cv::Mat in_crop = hole(crop);
   cv::Mat rim;
-  cv::dilate(in_crop, rim, ellipse(2 * kRim + 1));
+  cv::dilate(in_crop, rim, ellipse(2 * kSeamRim + 1));
   matched_to_rim(picture(crop), paint, rim, in_crop).copyTo(picture(crop), part.hole(crop));
 }
 

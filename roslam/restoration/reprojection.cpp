@@ -96,7 +96,7 @@ class Filling {
     return depths_;
   }
 
-  // Of the surfaces that views agree on the nearest that not more of them look through.
+  // Of the surfaces that views agree on the nearest that fewer of them look through than have it.
   float nearest_believed(const std::vector<float>& depths, int x, int y) const {
     for (std::size_t first = 0; first < depths.size();) {
       const float limit = depths[first] + 2.0F * links_.front().tolerance(depths[first]);
@@ -109,7 +109,7 @@ class Filling {
             const auto sighting = link.look_at(point);
             return sighting && link.sees_through(*sighting);
           }));
-      if (against < last - first || (against == 0 && last > first)) return depth;
+      if (against < last - first) return depth;
       first = last;
     }
     return 0.0F;

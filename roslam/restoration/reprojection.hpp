@@ -22,8 +22,8 @@ struct ReprojectedArea {
 };
 
 /// Fills an area of a picture with what other views, earlier and later ones, saw there. For each pixel the
-/// nearest surface is taken that some view measured and that not more views look through; its colour is
-/// blended from the views that show it, those left out whose colour the others contradict.
+/// nearest surface is taken that some view measured and that fewer views look through than have it; its
+/// colour is blended from the views that show it, those left out whose colour the others contradict.
 class BackgroundReprojection {
  public:
   BackgroundReprojection(const Camera& camera, const ReprojectionOptions& options)

@@ -49,7 +49,7 @@ cv::Mat matched_to_rim(const cv::Mat& picture, const cv::Mat& paint, const cv::M
   std::vector<cv::Mat> channels;
   cv::split(cv::abs(difference), channels);
   const cv::Mat largest = cv::max(cv::max(channels[0], channels[1]), channels[2]);
-  const cv::Mat tells = known & ~hole & (largest <= kLargestShift);
+  const cv::Mat tells = (known != 0) & (hole == 0) & (largest <= kLargestShift);
   if (cv::countNonZero(tells) == 0) return paint.clone();
   difference.setTo(0, ~tells);
   cv::Mat weight;

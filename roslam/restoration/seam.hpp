@@ -5,6 +5,9 @@
 
 namespace roslam {
 
+inline constexpr int kSeamRim =
+    12;  ///< pixels around a hole along which what is put in is compared with the picture
+
 /// What is put into a hole, in the light of what is around it: along the rim, where both are known, they
 /// should be equal; their difference there, spread smoothly over the hole, is added. picture: CV_8UC3 as
 /// taken. paint: CV_8UC3 of the same size, known where known (CV_8UC1) is nonzero, in the hole and along its

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/restoration/static_scene_restorer.hpp"
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 #include <string>
 
@@ -10,8 +11,6 @@
 namespace roslam {
 
 namespace {
-constexpr int kRim = 12;  // pixels around a hole along which what is filled in is compared with the picture
-
 const Camera& validated(const Camera& camera) {
   camera.validate();
   return camera;
@@ -62,6 +61,12 @@ void RestorationOptions::validate() const {
   require(queue >= 1 && queue <= 1000, "queue must be 1 to 1000");
 }
 
+std::size_t sources_that_fit(int allowed, const Camera& camera) {
+  constexpr double kUsualPixels = 640.0 * 480.0;
+  const double share = std::min(1.0, kUsualPixels / (static_cast<double>(camera.width) * camera.height));
+  return std::max<std::size_t>(1, static_cast<std::size_t>(allowed * share));
+}
+
 std::size_t RestoredView::pixels_of(Provenance from) const {
   return static_cast<std::size_t>(cv::countNonZero(provenance == static_cast<double>(from)));
 }
@@ -102,7 +107,8 @@ RestoredView StaticSceneRestorer::restore(const View& target, const std::vector<
   cv::Mat open = hole.clone();
   if (settings_.restoration.reproject) {
     cv::Mat area;
-    cv::dilate(hole, area, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * kRim + 1, 2 * kRim + 1}));
+    cv::dilate(hole, area,
+               cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * kSeamRim + 1, 2 * kSeamRim + 1}));
     const ReprojectedArea seen = reprojection_.fill(target, area, sources);
     const cv::Mat filled = seen.filled & hole & (seen.certainty >= settings_.restoration.min_certainty);
     matched_to_rim(target.colour, seen.colour, seen.filled, hole).copyTo(view.colour, filled);

@@ -29,7 +29,8 @@ struct RestorationOptions {
   double min_certainty = 0.004;  ///< of a reprojected pixel, 0 to 1; what is less sure is painted
   int margin = 8;                ///< pixels by which what was removed is dilated: outlines are blurred
 
-  // Which frames others are filled from; each takes 2.5 MB at 640x480.
+  // Which frames others are filled from; each takes 2.9 MB at 640x480. Of larger pictures accordingly fewer
+  // are kept.
   double source_interval = 0.5;  ///< seconds; of a recorded run, beside keyframes, a frame as often
   int max_sources = 200;         ///< of a recorded run; of more every n-th is used
   int recent_sources = 40;       ///< keyframes, in flight the newest
@@ -39,6 +40,9 @@ struct RestorationOptions {
   /// Throws OptionsError naming the field.
   void validate() const;
 };
+
+/// How many frames of a camera to keep where so many are allowed at 640x480; at least 1.
+std::size_t sources_that_fit(int allowed, const Camera& camera);
 
 /// A picture of the static scene; all images of the size of the picture taken.
 struct RestoredView {

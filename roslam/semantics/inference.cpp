@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <mutex>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/dnn.hpp>
 #include <system_error>
@@ -22,13 +23,22 @@ std::string first_line(const std::string& text) { return text.substr(0, text.fin
 // OpenCV prints what it then throws; callers report it themselves, once.
 class QuietOpenCv {
  public:
-  QuietOpenCv() : before_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
-  ~QuietOpenCv() { cv::utils::logging::setLogLevel(before_); }
+  QuietOpenCv() {
+    const std::scoped_lock lock(mutex_);
+    if (quiet_++ == 0) before_ = cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  }
+  ~QuietOpenCv() {
+    const std::scoped_lock lock(mutex_);
+    if (--quiet_ == 0) cv::utils::logging::setLogLevel(before_);
+  }
   QuietOpenCv(const QuietOpenCv&) = delete;
   QuietOpenCv& operator=(const QuietOpenCv&) = delete;
 
  private:
-  cv::utils::logging::LogLevel before_;
+  // OpenCV has one level for the whole process, and networks run on several threads.
+  static inline std::mutex mutex_;
+  static inline int quiet_ = 0;
+  static inline cv::utils::logging::LogLevel before_ = cv::utils::logging::LOG_LEVEL_WARNING;
 };
 
 class OpenCvInference : public Inference {
