@@ -89,6 +89,7 @@ RunSummary track(FrameSource& source, Slam& slam, std::optional<RemovalLog>& log
       },
       stop);
 }
+
 // Shared with the thread that restores.
 std::shared_ptr<RestoredFolder> begin_restoration(Flight& flight, const FlightArguments& arguments,
                                                   const RunFolder& run) {
