@@ -12,8 +12,6 @@
 namespace roslam::scene {
 namespace {
 
-constexpr Panel kPerson{-0.3, -0.6, 0.2, 0.9, 1.3};
-
 // A target with a person before the room, and what other views know.
 class Reprojection : public testing::Test {
  protected:

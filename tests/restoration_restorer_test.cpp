@@ -9,8 +9,6 @@
 namespace roslam::scene {
 namespace {
 
-constexpr Panel kPerson{-0.3, -0.6, 0.2, 0.9, 1.3};
-
 // Paints grey, and can fail.
 class GreyInpainter : public Inpainter {
  public:

@@ -12,6 +12,9 @@
 /// Views of the scenes of removal_scene.hpp with a thing in them that is removed.
 namespace roslam::scene {
 
+/// Hides parts of wall, shelf and bench.
+constexpr Panel kPerson{-0.3, -0.6, 0.2, 0.9, 1.3};
+
 inline cv::Mat in_colour(const cv::Mat& grey) {
   cv::Mat dim, colour;
   grey.convertTo(dim, CV_8U, 0.6, 30.0);

@@ -14,8 +14,6 @@
 namespace roslam::scene {
 namespace {
 
-constexpr Panel kPerson{-0.3, -0.6, 0.2, 0.9, 1.3};
-
 // Waits until it is let go, as a slow network; or throws.
 class SlowInpainter : public Inpainter {
  public:

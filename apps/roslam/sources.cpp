@@ -15,6 +15,18 @@ namespace roslam::app {
 
 namespace {
 constexpr std::string_view kSimulated = "simulated:";
+
+// Names every option of a simulated flight once, for writing and reading alike.
+template <typename Arguments, typename Visitor>
+void for_each_flight_option(Arguments& arguments, const Visitor& visit) {
+  visit("traffic", arguments.traffic);
+  visit("frames", arguments.frames);
+  visit("seed", arguments.seed);
+  visit("speed", arguments.speed);
+  visit("altitude", arguments.altitude);
+  visit("aside", arguments.aside);
+  visit("gain", arguments.gain);
+}
 }  // namespace
 
 CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
@@ -72,25 +84,19 @@ std::optional<SimulatorOptions> simulated_flight(const SourceArguments& argument
 
 std::map<std::string, std::string> flight_in_words(const SourceArguments& arguments) {
   if (!arguments.name.starts_with(kSimulated)) return {};
-  std::map<std::string, std::string> words{{"traffic", arguments.traffic}};
-  const auto add = [&](const char* name, auto value) {
+  std::map<std::string, std::string> words;
+  for_each_flight_option(arguments, [&](const char* name, const auto& value) {
     std::ostringstream text;
     text << std::setprecision(std::numeric_limits<double>::max_digits10) << value;
     words[name] = text.str();
-  };
-  add("frames", arguments.frames);
-  add("seed", arguments.seed);
-  add("speed", arguments.speed);
-  add("altitude", arguments.altitude);
-  add("aside", arguments.aside);
-  add("gain", arguments.gain);
+  });
   return words;
 }
 
 SourceArguments flight_from_words(const std::string& name, const std::map<std::string, std::string>& words) {
   SourceArguments arguments;
   arguments.name = name;
-  const auto take = [&](const char* key, auto& value) {
+  for_each_flight_option(arguments, [&](const char* key, auto& value) {
     const auto found = words.find(key);
     if (found == words.end()) return;
     std::istringstream text(found->second);
@@ -99,14 +105,7 @@ SourceArguments flight_from_words(const std::string& name, const std::map<std::s
         std::is_unsigned_v<std::decay_t<decltype(value)>> && found->second.starts_with('-');
     if (!is_number || is_negative)
       throw InputError(name + ": " + key + " of the flight is no number: " + found->second);
-  };
-  take("traffic", arguments.traffic);
-  take("frames", arguments.frames);
-  take("seed", arguments.seed);
-  take("speed", arguments.speed);
-  take("altitude", arguments.altitude);
-  take("aside", arguments.aside);
-  take("gain", arguments.gain);
+  });
   return arguments;
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "roslam/error.hpp"
+#include "roslam/geometry/upper_median.hpp"
 
 namespace roslam {
 
@@ -81,9 +82,7 @@ Cells cells_of(const cv::Mat& depth, const cv::Mat& hole, const DepthCompletionO
       }
       if (2 * guarded_pixels > box.area()) cells.is_hole.at<std::uint8_t>(cy, cx) = 255;
       if (2 * static_cast<int>(known.size()) <= box.area() - guarded_pixels || known.empty()) continue;
-      const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-      std::nth_element(known.begin(), middle, known.end());
-      cells.inverse.at<float>(cy, cx) = 1.0F / *middle;
+      cells.inverse.at<float>(cy, cx) = 1.0F / upper_median(known);
     }
   }
   return cells;

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "roslam/geometry/se3.hpp"
+#include "roslam/geometry/upper_median.hpp"
 #include "roslam/restoration/view_link.hpp"
 
 namespace roslam {
@@ -93,10 +94,7 @@ float AlignmentPoints::gain_of(const SourceView& source, const SE3& T_source_tar
         seen.value > 1.0F)
       ratios.push_back(p.brightness.back() / seen.value);
   }
-  if (ratios.size() < kFewestPoints) return 1.0F;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return *middle;
+  return ratios.size() < kFewestPoints ? 1.0F : upper_median(ratios);
 }
 
 AlignmentPoints::Fit AlignmentPoints::fit_of(const SourceView& source, const SE3& T_source_target,

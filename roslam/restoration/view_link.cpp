@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "roslam/geometry/upper_median.hpp"
+
 namespace roslam {
 
 namespace {
@@ -118,9 +120,7 @@ void ViewLink::match_light(const View& target, const cv::Mat& free) {
   for (int c = 0; c < 3; ++c) {
     auto& ratio = ratios[static_cast<std::size_t>(c)];
     if (ratio.size() < kLightSamples) return;
-    const auto middle = ratio.begin() + static_cast<std::ptrdiff_t>(ratio.size() / 2);
-    std::nth_element(ratio.begin(), middle, ratio.end());
-    gain_[c] = std::clamp(*middle, 1.0F / max_gain_, max_gain_);
+    gain_[c] = std::clamp(upper_median(ratio), 1.0F / max_gain_, max_gain_);
   }
 }
 
