@@ -174,10 +174,11 @@ void restore(RestoreArguments arguments, const std::string& version) {
   const RecordedRun run(run_folder_of(arguments, version, stop));
   RestoredFolder::require_apart(arguments.out, run.source());
   const auto settings = settings_for(arguments, run);
+  const auto first_pass = open_source_of(run);  // what is wrong with it is to be said alone
   const auto inpainter = inpainter_for(arguments, settings.restoration);
   StaticSceneRestorer restorer(run.camera(), settings, inpainter);
   SequenceRestorer sequence(run, restorer);
-  keep_sources(sequence, *open_source_of(run), arguments.flight.quiet, stop);
+  keep_sources(sequence, *first_pass, arguments.flight.quiet, stop);
   if (stop.stop_requested()) {  // what an earlier run restored stays
     std::cerr << "interrupted before anything was restored\n";
     return;
