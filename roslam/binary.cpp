@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/binary.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <fstream>
 #include <system_error>
 
@@ -22,16 +19,6 @@ constexpr std::size_t kHeader = kMagic + 4 + 8 + 4;
 std::uint32_t crc(std::string_view bytes) {
   return static_cast<std::uint32_t>(
       crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<z_size_t>(bytes.size())));
-}
-
-// So that no power cut leaves a new name on bytes that were never written.
-void flush_to_disk(const std::filesystem::path& file) {
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  const bool is_written = fsync(descriptor) == 0 || errno == EINVAL || errno == EROFS;
-  close(descriptor);
-  if (!is_written)
-    throw OutputError(file.string() + ": cannot be written in full; check the free space on the disk");
 }
 
 std::string megabytes(std::uintmax_t bytes) { return std::to_string(bytes / (1024 * 1024)) + " MB"; }
@@ -67,21 +54,7 @@ void write_binary(const std::filesystem::path& file, const BinaryFormat& format,
   whole.put(static_cast<std::uint64_t>(content.size()));
   whole.put(crc(content));
   whole.put_bytes(content);
-  std::filesystem::path part = file;
-  part += ".part";
-  std::error_code error;
-  try {
-    write_file(part, whole.bytes());
-    flush_to_disk(part);
-  } catch (...) {
-    std::filesystem::remove(part, error);
-    throw;
-  }
-  std::filesystem::rename(part, file, error);
-  if (!error) return;
-  const std::string reason = error.message();
-  std::filesystem::remove(part, error);
-  throw OutputError(file.string() + ": cannot be replaced (" + reason + "); choose another name");
+  replace_file(file, whole.bytes());
 }
 
 namespace {

@@ -26,6 +26,10 @@ inline void write_file(const std::filesystem::path& file, std::string_view bytes
     throw OutputError(file.string() + ": cannot be written in full; check the free space on the disk");
 }
 
+/// Writes all bytes to a file; what it held before stays until they are all on the disk, whatever happens.
+/// Throws OutputError.
+void replace_file(const std::filesystem::path& file, std::string_view bytes);
+
 /// Makes a folder, and those it lies in, where they are missing. Throws OutputError if it cannot be made.
 inline void make_folder(const std::filesystem::path& folder) {
   std::error_code error;

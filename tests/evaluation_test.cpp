@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
 
 #include "roslam/error.hpp"
 #include "roslam/evaluation/plot.hpp"
+#include "roslam/evaluation/point_grid.hpp"
 #include "roslam/evaluation/trajectory_error.hpp"
 #include "roslam/evaluation/trajectory_plot.hpp"
 #include "tests/scratch.hpp"
@@ -327,6 +329,31 @@ TEST(Plot, FiguresAreTheSameEachTimeAndSurviveDegenerateInput) {
   }
   EXPECT_THROW(write_png("/no/such/folder/figure.png", figure), OutputError);
   EXPECT_THROW(write_png("figure.xyz", figure), OutputError);
+}
+
+TEST(PointGrid, FindsTheNearestWithinItsReach) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> place(-1.0F, 1.0F);
+  const auto any = [&] { return Eigen::Vector3f(place(random), place(random), place(random)); };
+  std::vector<Eigen::Vector3f> points(500);
+  for (auto& point : points) point = any();
+  constexpr float kReach = 0.2F;
+  const PointGrid grid(points, kReach);
+  int found = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Eigen::Vector3f from = any();
+    const auto truth = std::min_element(points.begin(), points.end(), [&](const auto& a, const auto& b) {
+      return (a - from).norm() < (b - from).norm();
+    });
+    const auto nearest = grid.nearest(from);
+    ASSERT_EQ(nearest.has_value(), (*truth - from).norm() <= kReach);
+    if (!nearest) continue;
+    ++found;
+    EXPECT_EQ(nearest->index, static_cast<std::size_t>(truth - points.begin()));
+    EXPECT_NEAR(nearest->distance, (*truth - from).norm(), 1e-6F);
+  }
+  EXPECT_GT(found, 100);
+  EXPECT_FALSE(PointGrid({}, kReach).nearest(any()).has_value());
 }
 
 }  // namespace

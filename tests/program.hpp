@@ -28,7 +28,8 @@ inline std::string content(const std::filesystem::path& file) {
 inline Outcome shell_in(const std::filesystem::path& folder, const std::string& command) {
   const std::string whole = "cd '" + folder.string() + "' && " + command + " >stdout 2>stderr";
   const int status = std::system(whole.c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(folder / "stdout"), content(folder / "stderr")};
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(folder / "stdout"),
+          content(folder / "stderr")};
 }
 
 }  // namespace roslam

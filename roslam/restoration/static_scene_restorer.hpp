@@ -10,18 +10,12 @@
 #include "roslam/restoration/depth_completion.hpp"
 #include "roslam/restoration/inpainter.hpp"
 #include "roslam/restoration/invention.hpp"
+#include "roslam/restoration/provenance.hpp"
 #include "roslam/restoration/removed_region.hpp"
 #include "roslam/restoration/reprojection.hpp"
 #include "roslam/restoration/view.hpp"
 
 namespace roslam {
-
-/// Where a pixel of a restored picture comes from; values of images of provenance.
-enum class Provenance : std::uint8_t {
-  kMeasured = 0,       ///< the camera saw it in this frame
-  kReprojected = 128,  ///< the camera saw it at another time
-  kInvented = 255      ///< nobody saw it
-};
 
 struct RestorationOptions {
   bool reproject = true;         ///< fill from other views

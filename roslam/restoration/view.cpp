@@ -7,9 +7,7 @@
 
 namespace roslam {
 
-namespace {
-// Nonzero where depth is known and no neighbour's differs by more than noise allows.
-cv::Mat measured(const cv::Mat& depth, const DepthOptions& options) {
+cv::Mat clear_of_edges(const cv::Mat& depth, const DepthOptions& options) {
   const cv::Mat known = (depth >= options.min_depth) & (depth <= options.max_depth);  // false for NaN
   cv::Mat nearest = depth.clone();
   nearest.setTo(1e6, ~known);
@@ -20,7 +18,6 @@ cv::Mat measured(const cv::Mat& depth, const DepthOptions& options) {
   cv::Mat tolerance = farthest * options.edge_growth + options.edge_ratio;
   return known & (farthest - nearest <= tolerance.mul(farthest));
 }
-}  // namespace
 
 std::array<cv::Mat, kGreyLevels> grey_levels(const cv::Mat& colour) {
   std::array<cv::Mat, kGreyLevels> levels;
@@ -38,7 +35,7 @@ std::optional<SourceView> source_view(const View& view, const DepthOptions& opti
   SourceView source{view.timestamp, *view.T_world_camera, view.colour, {}, {}, {}, {}};
   source.is_static = view.removed.empty() ? cv::Mat(view.colour.size(), CV_8UC1, cv::Scalar(255))
                                           : cv::Mat(view.removed == 0);
-  source.is_measured = measured(view.depth, options) & source.is_static;
+  source.is_measured = clear_of_edges(view.depth, options) & source.is_static;
   if (cv::countNonZero(source.is_measured) == 0) return std::nullopt;
   cv::Mat sure = cv::Mat::zeros(view.depth.size(), CV_32FC1);
   view.depth.copyTo(sure, source.is_measured);

@@ -36,6 +36,10 @@ struct SourceView {
   std::array<cv::Mat, kGreyLevels> grey;  ///< of colour
 };
 
+/// Nonzero (CV_8UC1) where depth (CV_32FC1, metres) is within the limits and no neighbour's differs by more
+/// than noise allows: there foreground and background are mixed.
+cv::Mat clear_of_edges(const cv::Mat& depth, const DepthOptions& options);
+
 /// Prepares a view: readings that mix foreground and background are dropped, and what is unknown is guessed
 /// from its surroundings, well enough to tell where a colour belongs. Nothing without a pose or depth.
 std::optional<SourceView> source_view(const View& view, const DepthOptions& options);

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/cloud/dense_view.hpp"
+
+#include <algorithm>
+#include <array>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "roslam/error.hpp"
+#include "roslam/restoration/provenance.hpp"
+#include "roslam/restoration/view.hpp"
+#include "roslam/semantics/label_set.hpp"
+
+namespace roslam {
+
+namespace {
+constexpr double kUnitsPerMetre = 1000.0;  // of packed depth
+constexpr int kColourQuality = 92;         // JPEG, in percent
+
+std::vector<std::uint8_t> encoded(const std::string& extension, const cv::Mat& image,
+                                  const std::vector<int>& parameters) {
+  std::vector<std::uint8_t> bytes;
+  if (!cv::imencode(extension, image, bytes, parameters))
+    throw Error("a view of the dense map could not be packed");
+  return bytes;
+}
+
+Camera reduced_camera(const Camera& camera, int stride) {
+  Camera reduced = camera;
+  reduced.width = (camera.width + stride - 1) / stride;
+  reduced.height = (camera.height + stride - 1) / stride;
+  for (double* value : {&reduced.fx, &reduced.fy, &reduced.cx, &reduced.cy}) *value /= stride;
+  reduced.distortion = {};
+  return reduced;
+}
+
+DepthOptions with_limit(DepthOptions depth, double max_depth) {
+  depth.max_depth = std::max(depth.min_depth, std::min(depth.max_depth, max_depth));
+  return depth;
+}
+}  // namespace
+
+PackedView pack(const DenseView& view) {
+  cv::Mat millimetres;
+  view.depth.convertTo(millimetres, CV_16UC1, kUnitsPerMetre);
+  cv::Mat marks;
+  cv::merge(std::array<cv::Mat, 3>{view.labels, view.provenance, cv::Mat::zeros(view.labels.size(), CV_8UC1)},
+            marks);
+  const std::vector<int> fast{cv::IMWRITE_PNG_COMPRESSION, 1};
+  return {view.camera, encoded(".jpg", view.colour, {cv::IMWRITE_JPEG_QUALITY, kColourQuality}),
+          encoded(".png", millimetres, fast), encoded(".png", marks, fast)};
+}
+
+DenseView unpack(const PackedView& packed) {
+  DenseView view;
+  view.camera = packed.camera;
+  view.colour = cv::imdecode(packed.colour, cv::IMREAD_COLOR);
+  cv::imdecode(packed.depth, cv::IMREAD_UNCHANGED).convertTo(view.depth, CV_32FC1, 1.0 / kUnitsPerMetre);
+  const cv::Mat marks = cv::imdecode(packed.marks, cv::IMREAD_UNCHANGED);
+  cv::extractChannel(marks, view.labels, 0);
+  cv::extractChannel(marks, view.provenance, 1);
+  return view;
+}
+
+ViewReducer::ViewReducer(const Camera& camera, const DenseOptions& dense, const DepthOptions& depth)
+    : depth_(with_limit(depth, dense.max_depth)), reduced_(reduced_camera(camera, dense.stride)) {
+  map_x_.create(reduced_.height, reduced_.width, CV_32FC1);
+  map_y_.create(map_x_.size(), CV_32FC1);
+  for (int y = 0; y < reduced_.height; ++y) {
+    for (int x = 0; x < reduced_.width; ++x) {
+      const Eigen::Vector2d taken = camera.distort(Eigen::Vector2d(x, y) * dense.stride);
+      map_x_.at<float>(y, x) = static_cast<float>(taken.x());
+      map_y_.at<float>(y, x) = static_cast<float>(taken.y());
+    }
+  }
+}
+
+DenseView ViewReducer::reduce(const cv::Mat& colour, const cv::Mat& depth, const cv::Mat& labels,
+                              const cv::Mat& provenance, const cv::Mat& hidden) const {
+  cv::Mat usable = clear_of_edges(depth, depth_);
+  if (!hidden.empty()) usable.setTo(0, hidden);
+  cv::Mat kept = cv::Mat::zeros(depth.size(), CV_32FC1);
+  depth.copyTo(kept, usable);
+  DenseView view;
+  view.camera = reduced_;
+  const auto nearest = [&](const cv::Mat& image, double otherwise) {
+    if (image.empty()) return cv::Mat(map_x_.size(), CV_8UC1, cv::Scalar(otherwise));
+    cv::Mat result;
+    cv::remap(image, result, map_x_, map_y_, cv::INTER_NEAREST, cv::BORDER_CONSTANT, otherwise);
+    return result;
+  };
+  cv::remap(colour, view.colour, map_x_, map_y_, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  view.depth = nearest(kept, 0.0);
+  view.labels = nearest(labels, kVoid);
+  view.provenance = nearest(provenance, static_cast<double>(Provenance::kMeasured));
+  view.labels.setTo(kVoid, view.provenance != static_cast<double>(Provenance::kMeasured));
+  return view;
+}
+
+}  // namespace roslam

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/cloud/map_picture.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <tuple>
+#include <utility>
+
+#include "roslam/semantics/label_set.hpp"
+
+namespace roslam {
+
+namespace {
+constexpr float kNearest = 0.1F;  // metres before the camera
+const cv::Scalar kPaper(255, 255, 255);
+
+constexpr std::array kNames{std::pair{"rgb", MapColour::kRgb}, std::pair{"height", MapColour::kHeight},
+                            std::pair{"class", MapColour::kClass},
+                            std::pair{"provenance", MapColour::kProvenance}};
+
+// Heights that all but a few points lie between.
+std::pair<float, float> usual_heights(const Surface& surface) {
+  std::vector<float> heights;
+  heights.reserve(surface.points.size());
+  for (const SurfacePoint& point : surface.points) heights.push_back(point.position.z());
+  if (heights.empty()) return {0.0F, 1.0F};
+  const auto at = [&](double share) {
+    const auto n =
+        heights.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(heights.size() - 1));
+    std::nth_element(heights.begin(), n, heights.end());
+    return *n;
+  };
+  const float low = at(0.02);
+  return {low, std::max(at(0.98), low + 0.01F)};
+}
+
+cv::Vec3b rainbow(float share) {
+  const cv::Mat grey(1, 1, CV_8UC1, cv::Scalar(std::clamp(share, 0.0F, 1.0F) * 255.0F));
+  cv::Mat colour;
+  cv::applyColorMap(grey, colour, cv::COLORMAP_TURBO);
+  return colour.at<cv::Vec3b>(0);
+}
+
+cv::Vec3b provenance_colour(Provenance provenance) {
+  if (provenance == Provenance::kMeasured) return {200, 200, 200};
+  return provenance == Provenance::kReprojected ? cv::Vec3b(80, 200, 80) : cv::Vec3b(220, 60, 220);
+}
+
+// Light from above and behind the camera, so that colours that stand for something show shapes too.
+cv::Vec3b lit(const cv::Vec3b& colour, const Eigen::Vector3f& normal) {
+  const float light = 0.55F + 0.45F * std::abs(normal.dot(Eigen::Vector3f(0.4F, 0.3F, 0.87F)));
+  return {cv::saturate_cast<std::uint8_t>(static_cast<float>(colour[0]) * light),
+          cv::saturate_cast<std::uint8_t>(static_cast<float>(colour[1]) * light),
+          cv::saturate_cast<std::uint8_t>(static_cast<float>(colour[2]) * light)};
+}
+
+class Painter {
+ public:
+  Painter(const Surface& surface, MapColour colour) : colour_(colour) {
+    if (colour != MapColour::kHeight) return;
+    std::tie(low_, high_) = usual_heights(surface);
+    for (std::size_t i = 0; i < heights_.size(); ++i)
+      heights_[i] = rainbow(static_cast<float>(i) / static_cast<float>(heights_.size() - 1));
+  }
+
+  cv::Vec3b operator()(const SurfacePoint& point) const {
+    switch (colour_) {
+      case MapColour::kRgb:
+        return point.colour;
+      case MapColour::kClass:
+        return lit(class_colour(point.label), point.normal);
+      case MapColour::kProvenance:
+        return lit(provenance_colour(point.provenance), point.normal);
+      case MapColour::kHeight:
+        break;
+    }
+    const float share = std::clamp((point.position.z() - low_) / (high_ - low_), 0.0F, 1.0F);
+    return lit(heights_[static_cast<std::size_t>(share * static_cast<float>(heights_.size() - 1))],
+               point.normal);
+  }
+
+ private:
+  MapColour colour_;
+  float low_ = 0.0F, high_ = 1.0F;
+  std::array<cv::Vec3b, 256> heights_{};
+};
+}  // namespace
+
+std::optional<MapColour> map_colour_from(std::string_view name) {
+  for (const auto& [known, colour] : kNames)
+    if (known == name) return colour;
+  return std::nullopt;
+}
+
+std::vector<std::string> map_colour_names() {
+  std::vector<std::string> result;
+  for (const auto& [name, colour] : kNames) result.push_back(name);
+  return result;
+}
+
+MapView top_view(const Surface& surface, const cv::Size& size) {
+  Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
+  for (const SurfacePoint& point : surface.points) {
+    low = low.cwiseMin(point.position);
+    high = high.cwiseMax(point.position);
+  }
+  if (surface.points.empty()) low = high = Eigen::Vector3f::Zero();
+  constexpr double kMargin = 1.05;
+  const double wide = std::max(1.0, static_cast<double>(high.x() - low.x())) * kMargin;
+  const double tall = std::max(1.0, static_cast<double>(high.y() - low.y())) * kMargin;
+  const double pixels_a_metre = std::min(size.width / wide, size.height / tall);
+  // So high up that what is high is hardly drawn larger than what is low.
+  const double above = 50.0 * std::max(wide, tall);
+  MapView view;
+  view.camera.width = size.width;
+  view.camera.height = size.height;
+  view.camera.fx = view.camera.fy = pixels_a_metre * above;
+  view.camera.cx = 0.5 * (size.width - 1);
+  view.camera.cy = 0.5 * (size.height - 1);
+  Eigen::Matrix3d down;
+  down << 1, 0, 0, 0, -1, 0, 0, 0, -1;
+  const Eigen::Vector3d middle = (0.5F * (low + high)).cast<double>();
+  view.T_world_camera = SE3(down, {middle.x(), middle.y(), static_cast<double>(low.z()) + above});
+  return view;
+}
+
+MapView front_view(const SE3& T_world_camera, const cv::Size& size) {
+  MapView view;
+  view.camera.width = size.width;
+  view.camera.height = size.height;
+  view.camera.fx = view.camera.fy = 0.7 * size.width;
+  view.camera.cx = 0.5 * (size.width - 1);
+  view.camera.cy = 0.5 * (size.height - 1);
+  constexpr double kUp = 1.5, kBack = 2.5;  // metres
+  const double pitch = 0.2;                 // radians, downwards
+  const SE3 T_camera_view(so3_exp({-pitch, 0.0, 0.0}), {0.0, -kUp, -kBack});
+  view.T_world_camera = T_world_camera * T_camera_view;
+  return view;
+}
+
+cv::Mat draw_surface(const Surface& surface, const MapView& view, MapColour colour, double point_size) {
+  const cv::Size size(view.camera.width, view.camera.height);
+  cv::Mat picture(size, CV_8UC3, kPaper);
+  cv::Mat nearest(size, CV_32FC1, cv::Scalar(std::numeric_limits<float>::max()));
+  const Eigen::Matrix3f rotation = view.T_world_camera.inverse().rotation().toRotationMatrix().cast<float>();
+  const Eigen::Vector3f translation = view.T_world_camera.inverse().translation().cast<float>();
+  const auto fx = static_cast<float>(view.camera.fx), fy = static_cast<float>(view.camera.fy);
+  const auto cx = static_cast<float>(view.camera.cx), cy = static_cast<float>(view.camera.cy);
+  const Painter paint(surface, colour);
+  const cv::Rect image({0, 0}, size);
+  for (const SurfacePoint& point : surface.points) {
+    const Eigen::Vector3f at = rotation * point.position + translation;
+    if (at.z() < kNearest) continue;
+    const float u = at.x() / at.z() * fx + cx, v = at.y() / at.z() * fy + cy;
+    const float half = 0.5F * static_cast<float>(point_size) * fx / at.z();
+    if (!(u + half >= 0.0F && v + half >= 0.0F && u - half < static_cast<float>(size.width) &&
+          v - half < static_cast<float>(size.height)))
+      continue;
+    const cv::Point low(static_cast<int>(std::floor(u - half + 0.5F)),
+                        static_cast<int>(std::floor(v - half + 0.5F)));
+    const cv::Point high(static_cast<int>(std::ceil(u + half + 0.5F)),
+                         static_cast<int>(std::ceil(v + half + 0.5F)));
+    const cv::Rect square = cv::Rect(low, high) & image;
+    const cv::Vec3b value = paint(point);
+    for (int y = square.y; y < square.br().y; ++y) {
+      for (int x = square.x; x < square.br().x; ++x) {
+        if (nearest.at<float>(y, x) <= at.z()) continue;
+        nearest.at<float>(y, x) = at.z();
+        picture.at<cv::Vec3b>(y, x) = value;
+      }
+    }
+  }
+  return picture;
+}
+
+}  // namespace roslam

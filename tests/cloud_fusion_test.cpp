@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "roslam/cloud/local_planes.hpp"
+#include "roslam/cloud/surface.hpp"
+#include "roslam/cloud/visibility_check.hpp"
+#include "roslam/cloud/voxel_map.hpp"
+#include "tests/cloud_scene.hpp"
+
+namespace {
+using namespace roslam;
+using cloud_scene::kFloor;
+using cloud_scene::kWall;
+using cloud_scene::Slab;
+
+const Slab kThing{2, 2.0, {-0.5, -0.5, -9}, {0.5, 0.9, 9}, {0, 0, 250}};
+
+VoxelReading reading(float distance, Provenance provenance = Provenance::kMeasured,
+                     std::uint8_t label = kVoid) {
+  return {distance, 1.0F, {10, 20, 30}, label, provenance};
+}
+
+VoxelMap fused(const std::vector<Slab>& slabs, const std::vector<SE3>& poses) {
+  VoxelMap map(0.05, cloud_scene::options(), {});
+  const Camera camera = cloud_scene::camera();
+  for (const SE3& pose : poses)
+    map.integrate(cloud_scene::view(cloud_scene::show(slabs, pose, camera), camera), pose);
+  return map;
+}
+
+std::size_t points_on(const Surface& surface, const Slab& slab, double tolerance) {
+  return static_cast<std::size_t>(
+      std::count_if(surface.points.begin(), surface.points.end(), [&](const auto& p) {
+        const Eigen::Vector3d at = p.position.template cast<double>();
+        return std::abs(at[slab.axis] - slab.at) < tolerance &&
+               (at.array() >= slab.low.array() - tolerance).all() &&
+               (at.array() <= slab.high.array() + tolerance).all();
+      }));
+}
+
+TEST(LocalPlanes, AreExactOnATiltedPlane) {
+  const Camera camera = cloud_scene::camera();
+  const SE3 pose(so3_exp({0.3, 0.6, 0.1}), {0.2, 0.1, 0.3});
+  const auto picture = cloud_scene::show({kWall}, pose, camera);
+  const cv::Mat planes = local_planes(picture.depth, camera);
+  const Eigen::Vector3d normal = pose.rotation().conjugate() * Eigen::Vector3d::UnitZ();
+  for (int y = 10; y < camera.height; y += 50) {
+    for (int x = 10; x < camera.width; x += 50) {
+      if (picture.depth.at<float>(y, x) == 0.0F) continue;  // beyond the end of the wall
+      const auto& plane = planes.at<cv::Vec4f>(y, x);
+      EXPECT_NEAR(normal.dot(Eigen::Vector3d(plane[0], plane[1], plane[2])), 1.0, 1e-4);
+      EXPECT_NEAR(plane[3], 3.7, 2e-3);
+    }
+  }
+}
+
+TEST(LocalPlanes, DoNotReachAcrossAnEdge) {
+  const Camera camera = cloud_scene::camera();
+  const auto picture = cloud_scene::show({kWall, kThing}, SE3(), camera);
+  const cv::Mat planes = local_planes(picture.depth, camera);
+  for (int x = 0; x < camera.width; ++x) {
+    const auto& plane = planes.at<cv::Vec4f>(120, x);
+    EXPECT_NEAR(plane[2], 1.0F, 1e-4F);
+    EXPECT_NEAR(plane[3], picture.depth.at<float>(120, x), 1e-3F);
+  }
+}
+
+TEST(Voxel, TakesTheMean) {
+  Voxel voxel;
+  EXPECT_FALSE(voxel.is_known());
+  voxel.add(reading(0.5F));
+  voxel.add(reading(-0.1F));
+  EXPECT_NEAR(voxel.distance(), 0.2F, 1e-3F);
+  EXPECT_NEAR(voxel.weight(), 2.0F, 0.01F);
+  EXPECT_NEAR(voxel.colour()[2], 30.0F, 0.1F);
+}
+
+TEST(Voxel, DropsWhatWasInventedOnceItWasSeen) {
+  for (const Provenance seen : {Provenance::kMeasured, Provenance::kReprojected}) {
+    Voxel voxel;
+    for (int i = 0; i < 20; ++i) voxel.add(reading(-0.5F, Provenance::kInvented));
+    EXPECT_EQ(voxel.provenance(), Provenance::kInvented);
+    voxel.add(reading(0.3F, seen));
+    EXPECT_EQ(voxel.provenance(), seen);
+    EXPECT_NEAR(voxel.distance(), 0.3F, 1e-3F);
+    voxel.add(reading(-0.5F, Provenance::kInvented));
+    EXPECT_NEAR(voxel.distance(), 0.3F, 1e-3F);
+  }
+}
+
+TEST(Voxel, IsOfTheBestProvenanceOfItsSurface) {
+  Voxel voxel;
+  voxel.add(reading(1.0F));  // free: tells nothing of the surface
+  voxel.add(reading(0.2F, Provenance::kReprojected));
+  EXPECT_EQ(voxel.provenance(), Provenance::kReprojected);
+  voxel.add(reading(0.2F));
+  EXPECT_EQ(voxel.provenance(), Provenance::kMeasured);
+  voxel.add(reading(0.2F, Provenance::kReprojected));
+  EXPECT_EQ(voxel.provenance(), Provenance::kMeasured);
+}
+
+TEST(Voxel, IsCarvedByRaysThatPassThroughAndKeptByThoseThatPassBefore) {
+  Voxel inside, before;
+  inside.add(reading(-0.4F));
+  before.add(reading(0.4F));
+  for (int i = 0; i < 3; ++i) {
+    inside.add(reading(1.0F));
+    before.add(reading(1.0F));
+  }
+  EXPECT_GT(inside.distance(), 0.0F);
+  EXPECT_NEAR(before.distance(), 0.4F, 1e-3F);
+}
+
+TEST(Voxel, TakesTheLabelOfTheMajority) {
+  Voxel voxel;
+  for (const std::uint8_t label : std::to_array<std::uint8_t>({3, 7, 7, 255, 3, 7, 7}))
+    voxel.add(reading(0.1F, Provenance::kMeasured, label));
+  EXPECT_EQ(voxel.label(), 7);
+}
+
+TEST(VoxelMap, HasTheSurfacesWhereTheyAre) {
+  const VoxelMap map = fused({kWall, kFloor}, cloud_scene::walk(6));
+  const Surface surface = extract_surface(map, {});
+  ASSERT_GT(surface.points.size(), 5000U);
+  std::size_t rough = 0;
+  for (const SurfacePoint& point : surface.points) {
+    // In the corner of the room distances to two planes mix.
+    if (point.position.z() > 3.8F && point.position.y() > 1.0F) continue;
+    const double off = cloud_scene::distance(point.position, {kWall, kFloor});
+    const bool is_floor = std::abs(point.position.y() - 1.2F) < 0.02F;
+    const Eigen::Vector3f normal = is_floor ? -Eigen::Vector3f::UnitY() : -Eigen::Vector3f::UnitZ();
+    EXPECT_LT(off, 0.015);
+    EXPECT_GT(normal.dot(point.normal), 0.85F);
+    if (off > 0.003 || normal.dot(point.normal) < 0.98F) ++rough;
+    EXPECT_LT(cv::norm(cv::Vec3i(point.colour), cv::Vec3i(is_floor ? kFloor.colour : kWall.colour)), 12.0);
+  }
+  // At the rim of what was seen.
+  EXPECT_LT(rough, surface.points.size() / 50);
+}
+
+TEST(VoxelMap, HasAFloorSeenAtAFlatAngleWithoutHoles) {
+  const VoxelMap map = fused({kFloor}, {SE3()});
+  const Surface surface = extract_surface(map, {0.0, false, true});
+  // From 2 to 7 metres ahead, 1.2 m below the camera, a point for each voxel.
+  std::size_t found = 0;
+  for (const SurfacePoint& point : surface.points)
+    if (point.position.z() > 3.0F && point.position.z() < 7.0F && std::abs(point.position.x()) < 1.0F)
+      ++found;
+  EXPECT_GT(found, 0.97 * (4.0 / 0.05) * (2.0 / 0.05));
+}
+
+TEST(Surface, HasTrianglesThatFaceFreeSpaceAndJoin) {
+  const VoxelMap map = fused({kWall, kFloor}, cloud_scene::walk(4));
+  const Surface surface = extract_surface(map, {});
+  ASSERT_GT(surface.triangles.size(), surface.points.size());
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
+  for (const auto& t : surface.triangles) {
+    const auto at = [&](std::size_t i) { return surface.points[t[i]].position; };
+    const Eigen::Vector3f normal = (at(1) - at(0)).cross(at(2) - at(0));
+    const bool is_corner = at(0).z() > 3.7F && at(0).y() > 0.9F;
+    if (!is_corner && normal.norm() > 1e-6F) {
+      EXPECT_GT(normal.normalized().dot(surface.points[t[0]].normal), 0.5F);
+    }
+    for (std::size_t i = 0; i < 3; ++i) ++edges[{t[i], t[(i + 1) % 3]}];
+  }
+  // Each edge at most once in each direction: triangles agree on which side is which.
+  for (const auto& [edge, count] : edges) EXPECT_EQ(count, 1);
+}
+
+TEST(Surface, LosesPointsWithTheirTriangles) {
+  Surface surface;
+  surface.points.resize(4);
+  surface.triangles = {{0, 1, 2}, {1, 2, 3}};
+  const Surface rest = kept(surface, {false, true, true, true});
+  EXPECT_EQ(rest.points.size(), 3U);
+  ASSERT_EQ(rest.triangles.size(), 1U);
+  EXPECT_EQ(rest.triangles[0], (std::array<std::uint32_t, 3>{0, 1, 2}));
+}
+
+TEST(VoxelMap, IsRidOfWhatLaterViewsLookThrough) {
+  VoxelMap map = fused({kWall, kFloor, kThing}, {SE3()});
+  ASSERT_GT(points_on(extract_surface(map, {}), kThing, 0.06), 100U);
+  const Camera camera = cloud_scene::camera();
+  for (int i = 0; i < 4; ++i)
+    map.integrate(cloud_scene::view(cloud_scene::show({kWall, kFloor}, SE3(), camera), camera), SE3());
+  EXPECT_EQ(points_on(extract_surface(map, {}), kThing, 0.06), 0U);
+}
+
+TEST(VisibilityCheck, FindsWhatEarlierViewsLookedThrough) {
+  const Camera camera = cloud_scene::camera();
+  const DenseView empty = cloud_scene::view(cloud_scene::show({kWall, kFloor}, SE3(), camera), camera);
+  const DenseView ghost =
+      cloud_scene::view(cloud_scene::show({kWall, kFloor, kThing}, SE3(), camera), camera);
+  VoxelMap map(0.05, cloud_scene::options(), {});
+  for (const DenseView* view : {&empty, &empty, &ghost}) map.integrate(*view, SE3());
+  const Surface surface = extract_surface(map, {});
+  ASSERT_GT(points_on(surface, kThing, 0.06), 100U);
+  VisibilityCheck check(surface, 0.05, {});
+  for (const DenseView* view : {&empty, &empty, &ghost}) check.ask(*view, SE3());
+  const Surface rest = kept(surface, check.confirmed());
+  EXPECT_EQ(points_on(rest, kThing, 0.06), 0U);
+  EXPECT_EQ(points_on(rest, kWall, 0.02), points_on(surface, kWall, 0.02));
+}
+}  // namespace
