@@ -11,6 +11,7 @@ void add_run_command(CLI::App& program, const std::string& version);
 void add_simulate_command(CLI::App& program);
 void add_compose_command(CLI::App& program);
 void add_restore_command(CLI::App& program, const std::string& version);
+void add_render_command(CLI::App& program);
 void add_segment_command(CLI::App& program);
 void add_evaluate_command(CLI::App& program);
 void add_map_command(CLI::App& program);

@@ -31,6 +31,7 @@ int main(int argc, char** argv) {
   roslam::app::add_simulate_command(program);
   roslam::app::add_compose_command(program);
   roslam::app::add_restore_command(program, ROSLAM_VERSION);
+  roslam::app::add_render_command(program);
   roslam::app::add_segment_command(program);
   roslam::app::add_evaluate_command(program);
   roslam::app::add_map_command(program);
