@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   rb::register_bundle_benchmarks();
   rb::register_place_benchmarks(flight);
   rb::register_restoration_benchmarks(flight);
+  rb::register_dense_benchmarks(flight);
   rb::register_segmentation_benchmarks(flight);
   rb::register_slam_benchmarks(flight);
   benchmark::RunSpecifiedBenchmarks();
