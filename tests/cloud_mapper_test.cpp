@@ -122,8 +122,9 @@ TEST(DenseMapper, BecomesCoarserInsteadOfTooLarge) {
 TEST(DenseMapper, PassesOverViewsWithoutDepthAndPosesThatAreNone) {
   const Walk walk;
   DenseMapper mapper(cloud_scene::options(), {});
-  DenseView blind = walk.view(0);
-  blind.depth.setTo(0);
+  const auto picture = cloud_scene::show({kWall}, SE3(), walk.camera);
+  const DenseView blind = cloud_scene::view({picture.colour, {}}, walk.camera);
+  EXPECT_EQ(cv::countNonZero(blind.depth), 0);
   mapper.insert(id(0), blind, {kHere, SE3()});
   const SE3 nowhere = SE3::from_parts(Eigen::Quaterniond::Identity(),
                                       Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
@@ -131,7 +132,7 @@ TEST(DenseMapper, PassesOverViewsWithoutDepthAndPosesThatAreNone) {
   EXPECT_TRUE(mapper.keyframes().empty());
   EXPECT_TRUE(mapper.surface(kHere).points.empty());
   mapper.insert(id(2), walk.view(2), {kHere, walk.truth[2]});
-  EXPECT_EQ(mapper.follow({{id(2), {kHere, nowhere}}}), 0U);
+  EXPECT_EQ(mapper.follow({{id(2), {kElsewhere, nowhere}}}), 0U);
 }
 
 TEST(DenseMapper, LeavesBeWhatIsBeyondItsRange) {

@@ -75,7 +75,7 @@ inline DenseOptions options() {
 /// As a keyframe is fused; provenance: of all of it.
 inline DenseView view(const Picture& picture, const Camera& camera, const DenseOptions& dense = options(),
                       Provenance provenance = Provenance::kMeasured) {
-  const cv::Mat from(picture.depth.size(), CV_8UC1, cv::Scalar(static_cast<double>(provenance)));
+  const cv::Mat from(picture.colour.size(), CV_8UC1, cv::Scalar(static_cast<double>(provenance)));
   return ViewReducer(camera, dense, {}).reduce(picture.colour, picture.depth, {}, from, {});
 }
 

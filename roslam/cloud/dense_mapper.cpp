@@ -35,7 +35,7 @@ void DenseOptions::validate() const {
   };
   require(voxel_size == 0.0 || (voxel_size >= 0.001 && voxel_size <= 10.0),
           "voxel_size must be 0 (chosen by the first view) or 0.001 to 10 metres");
-  require(max_depth > 0.0 && max_depth <= 1000.0, "max_depth must be above 0 and at most 1000 metres");
+  require(max_depth > 0.0 && max_depth <= 65.0, "max_depth must be above 0 and at most 65 metres");
   require(stride >= 1 && stride <= 16, "stride must be 1 to 16 pixels");
   require(truncation >= 2.0 && truncation <= 20.0, "truncation must be 2 to 20 voxels");
   require(min_weight >= 0.0 && min_weight <= 60.0, "min_weight must be 0 to 60");
@@ -66,8 +66,8 @@ void DenseMapper::insert(KeyframeId id, const DenseView& view, const KeyframePla
 
 // How far a point at the view's typical depth went.
 bool DenseMapper::has_moved(const Fused& fused, const KeyframePlace& place, double share) const {
-  if (fused.place.world != place.world) return true;
   if (!place.T_world_camera.is_finite()) return false;
+  if (fused.place.world != place.world) return true;
   const SE3 motion = fused.place.T_world_camera.inverse() * place.T_world_camera;
   const double moved = motion.translation().norm() + motion.angle() * fused.depth;
   return moved > share * options_.follow * voxel_size_;
@@ -103,9 +103,11 @@ void DenseMapper::fuse_again(WorldId world, const BlockSet& blocks) {
 bool DenseMapper::may_reach(const Fused& fused, const VoxelMap& map, const BlockSet& blocks) const {
   const Eigen::Vector3f centre = fused.place.T_world_camera.translation().cast<float>();
   const float side = kBlockSide * map.voxel_size();
-  // A ray to the corner of a wide picture is about so much longer than it is deep.
-  constexpr double kCorner = 2.0;
-  const float reach = static_cast<float>(kCorner * options_.max_depth) + 2.0F * side;
+  // A ray to the corner of a picture is longer than it is deep.
+  const Camera& camera = fused.view.camera;
+  const Eigen::Vector3d corner(std::max(camera.cx, camera.width - camera.cx) / camera.fx,
+                               std::max(camera.cy, camera.height - camera.cy) / camera.fy, 1.0);
+  const float reach = static_cast<float>(corner.norm() * options_.max_depth) + 2.0F * side;
   return std::any_of(blocks.begin(), blocks.end(), [&](const BlockKey& key) {
     return (map.centre(key, 0, 0, 0) - centre).squaredNorm() <= reach * reach;
   });

@@ -78,10 +78,9 @@ ViewReducer::ViewReducer(const Camera& camera, const DenseOptions& dense, const 
 
 DenseView ViewReducer::reduce(const cv::Mat& colour, const cv::Mat& depth, const cv::Mat& labels,
                               const cv::Mat& provenance, const cv::Mat& hidden) const {
-  cv::Mat usable = clear_of_edges(depth, depth_);
-  if (!hidden.empty()) usable.setTo(0, hidden);
-  cv::Mat kept = cv::Mat::zeros(depth.size(), CV_32FC1);
-  depth.copyTo(kept, usable);
+  cv::Mat kept = cv::Mat::zeros(colour.size(), CV_32FC1);
+  if (!depth.empty()) depth.copyTo(kept, clear_of_edges(depth, depth_));
+  if (!hidden.empty()) kept.setTo(0, hidden);
   DenseView view;
   view.camera = reduced_;
   const auto nearest = [&](const cv::Mat& image, double otherwise) {
