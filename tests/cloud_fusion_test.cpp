@@ -27,7 +27,7 @@ VoxelReading reading(float distance, Provenance provenance = Provenance::kMeasur
 
 VoxelMap fused(const std::vector<Slab>& slabs, const std::vector<SE3>& poses) {
   VoxelMap map(0.05, cloud_scene::options(), {});
-  const Camera camera = cloud_scene::camera();
+  const Camera camera = scene::small_camera();
   for (const SE3& pose : poses)
     map.integrate(cloud_scene::view(cloud_scene::show(slabs, pose, camera), camera), pose);
   return map;
@@ -44,7 +44,7 @@ std::size_t points_on(const Surface& surface, const Slab& slab, double tolerance
 }
 
 TEST(LocalPlanes, AreExactOnATiltedPlane) {
-  const Camera camera = cloud_scene::camera();
+  const Camera camera = scene::small_camera();
   const SE3 pose(so3_exp({0.3, 0.6, 0.1}), {0.2, 0.1, 0.3});
   const auto picture = cloud_scene::show({kWall}, pose, camera);
   const cv::Mat planes = local_planes(picture.depth, camera);
@@ -60,7 +60,7 @@ TEST(LocalPlanes, AreExactOnATiltedPlane) {
 }
 
 TEST(LocalPlanes, DoNotReachAcrossAnEdge) {
-  const Camera camera = cloud_scene::camera();
+  const Camera camera = scene::small_camera();
   const auto picture = cloud_scene::show({kWall, kThing}, SE3(), camera);
   const cv::Mat planes = local_planes(picture.depth, camera);
   for (int x = 0; x < camera.width; ++x) {
@@ -145,7 +145,9 @@ TEST(VoxelMap, HasTheSurfacesWhereTheyAre) {
 
 TEST(VoxelMap, HasAFloorSeenAtAFlatAngleWithoutHoles) {
   const VoxelMap map = fused({kFloor}, {SE3()});
-  const Surface surface = extract_surface(map, {0.0, false, true});
+  DenseOptions options;
+  options.min_weight = 0.0;
+  const Surface surface = extract_surface(map, options);
   // From 2 to 7 metres ahead, 1.2 m below the camera, a point for each voxel.
   std::size_t found = 0;
   for (const SurfacePoint& point : surface.points)
@@ -185,14 +187,14 @@ TEST(Surface, LosesPointsWithTheirTriangles) {
 TEST(VoxelMap, IsRidOfWhatLaterViewsLookThrough) {
   VoxelMap map = fused({kWall, kFloor, kThing}, {SE3()});
   ASSERT_GT(points_on(extract_surface(map, {}), kThing, 0.06), 100U);
-  const Camera camera = cloud_scene::camera();
+  const Camera camera = scene::small_camera();
   for (int i = 0; i < 4; ++i)
     map.integrate(cloud_scene::view(cloud_scene::show({kWall, kFloor}, SE3(), camera), camera), SE3());
   EXPECT_EQ(points_on(extract_surface(map, {}), kThing, 0.06), 0U);
 }
 
 TEST(VisibilityCheck, FindsWhatEarlierViewsLookedThrough) {
-  const Camera camera = cloud_scene::camera();
+  const Camera camera = scene::small_camera();
   const DenseView empty = cloud_scene::view(cloud_scene::show({kWall, kFloor}, SE3(), camera), camera);
   const DenseView ghost =
       cloud_scene::view(cloud_scene::show({kWall, kFloor, kThing}, SE3(), camera), camera);

@@ -17,7 +17,7 @@ constexpr WorldId kHere{0}, kElsewhere{1};
 // The truth of a walk past a wall, and where it was thought to be.
 struct Walk {
   std::vector<SE3> truth = cloud_scene::walk(6);
-  Camera camera = cloud_scene::camera();
+  Camera camera = scene::small_camera();
 
   DenseView view(std::size_t i, Provenance provenance = Provenance::kMeasured) const {
     return cloud_scene::view(cloud_scene::show({kWall, kFloor}, truth[i], camera), camera,
@@ -80,9 +80,9 @@ TEST(DenseMapper, LeavesOutWhatWasInventedIfAsked) {
   DenseMapper mapper(cloud_scene::options(), {});
   mapper.insert(id(0), walk.view(0, Provenance::kInvented), {kHere, walk.truth[0]});
   EXPECT_FALSE(mapper.surface(kHere).points.empty());
-  EXPECT_TRUE(mapper.surface(kHere, false).points.empty());
+  EXPECT_TRUE(without_invented(mapper.surface(kHere)).points.empty());
   mapper.insert(id(1), walk.view(0), {kHere, walk.truth[0]});
-  EXPECT_FALSE(mapper.surface(kHere, false).points.empty());
+  EXPECT_FALSE(without_invented(mapper.surface(kHere)).points.empty());
   for (const SurfacePoint& point : mapper.surface(kHere).points)
     EXPECT_EQ(point.provenance, Provenance::kMeasured);
 }
@@ -175,7 +175,7 @@ TEST(DenseView, IsUnpackedAsItWasPacked) {
 }
 
 TEST(ViewReducer, TakesTheLensAway) {
-  Camera camera = cloud_scene::camera();
+  Camera camera = scene::small_camera();
   camera.distortion = {-0.2, 0.05, 0.001, -0.002, 0.0};
   // A picture through the lens: each pixel holds its own ray, as depth that grows to the right.
   cv::Mat depth(camera.height, camera.width, CV_32FC1);

@@ -12,8 +12,9 @@
 #include "roslam/cloud/dense_mapper.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/se3.hpp"
+#include "tests/removal_scene.hpp"
 
-/// A room of flat things that the dense map is built of.
+/// A room of flat things that the dense map is built of, seen by the small camera of removal_scene.hpp.
 namespace roslam::cloud_scene {
 
 /// A rectangle across an axis of the world.
@@ -26,16 +27,6 @@ struct Slab {
 
 inline const Slab kWall{2, 4.0, {-9, -9, -9}, {9, 9, 9}, {40, 80, 160}};
 inline const Slab kFloor{1, 1.2, {-9, -9, -9}, {9, 9, 9}, {120, 120, 60}};
-
-inline Camera camera() {
-  Camera result;
-  result.width = 320;
-  result.height = 240;
-  result.fx = result.fy = 260.0;
-  result.cx = 159.5;
-  result.cy = 119.5;
-  return result;
-}
 
 struct Picture {
   cv::Mat colour, depth;

@@ -44,12 +44,7 @@ struct Arguments {
 
 Surface read_map(const Arguments& arguments) {
   Surface surface = read_surface_ply(arguments.map);
-  if (arguments.no_invented) {
-    std::vector<bool> keep;
-    for (const SurfacePoint& point : surface.points)
-      keep.push_back(point.provenance != Provenance::kInvented);
-    surface = kept(surface, keep);
-  }
+  if (arguments.no_invented) surface = without_invented(surface);
   if (surface.points.empty())
     throw InputError(arguments.map + ": there are no points to draw; give another map");
   return surface;

@@ -141,11 +141,10 @@ const VoxelMap* DenseMapper::map(WorldId world) const {
   return found == maps_.end() ? nullptr : &found->second;
 }
 
-Surface DenseMapper::surface(WorldId world, bool keep_invented) const {
+Surface DenseMapper::surface(WorldId world) const {
   const VoxelMap* voxels = map(world);
   if (voxels == nullptr) return {};
-  const Surface surface =
-      extract_surface(*voxels, {options_.min_weight, options_.keep_movable, keep_invented});
+  const Surface surface = extract_surface(*voxels, options_);
   VisibilityCheck check(surface, voxel_size_, noise_);
   for (const auto& [id, fused] : fused_)
     if (fused.place.world == world) check.ask(unpack(fused.view), fused.place.T_world_camera);

@@ -43,7 +43,7 @@ class DenseMapper {
   const VoxelMap* map(WorldId world) const;
 
   /// The surfaces of a world, less what other views look through. Empty if nothing was fused there.
-  Surface surface(WorldId world, bool keep_invented = true) const;
+  Surface surface(WorldId world) const;
 
   double voxel_size() const { return voxel_size_; }       ///< metres; 0 before the first view
   std::size_t voxel_bytes() const;                        ///< of all worlds

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "roslam/geometry/motion.hpp"
 #include "roslam/semantics/label_set.hpp"
 
 namespace roslam {
@@ -145,14 +146,13 @@ cv::Mat draw_surface(const Surface& surface, const MapView& view, MapColour colo
   const cv::Size size(view.camera.width, view.camera.height);
   cv::Mat picture(size, CV_8UC3, kPaper);
   cv::Mat nearest(size, CV_32FC1, cv::Scalar(std::numeric_limits<float>::max()));
-  const Eigen::Matrix3f rotation = view.T_world_camera.inverse().rotation().toRotationMatrix().cast<float>();
-  const Eigen::Vector3f translation = view.T_world_camera.inverse().translation().cast<float>();
+  const Motion camera_from_world(view.T_world_camera.inverse());
   const auto fx = static_cast<float>(view.camera.fx), fy = static_cast<float>(view.camera.fy);
   const auto cx = static_cast<float>(view.camera.cx), cy = static_cast<float>(view.camera.cy);
   const Painter paint(surface, colour);
   const cv::Rect image({0, 0}, size);
   for (const SurfacePoint& point : surface.points) {
-    const Eigen::Vector3f at = rotation * point.position + translation;
+    const Eigen::Vector3f at = camera_from_world * point.position;
     if (at.z() < kNearest) continue;
     const float u = at.x() / at.z() * fx + cx, v = at.y() / at.z() * fy + cy;
     const float half = 0.5F * static_cast<float>(point_size) * fx / at.z();

@@ -2,7 +2,6 @@
 #include "roslam/cloud/surface.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <optional>
 #include <unordered_map>
@@ -20,7 +19,7 @@ using Corners = std::array<const Voxel*, 8>;
 
 class Extraction {
  public:
-  Extraction(const VoxelMap& map, const SurfaceOptions& options)
+  Extraction(const VoxelMap& map, const DenseOptions& options)
       : map_(map), options_(options), deepest_(kDeepest * map.voxel_size() / map.truncation()) {}
 
   Surface run() {
@@ -33,17 +32,6 @@ class Extraction {
 
  private:
   using Places = std::array<std::uint32_t, kBlockVoxels>;
-
-  // A voxel by its place about a block, which may lie in another one.
-  struct Place {
-    BlockKey key;
-    std::size_t index;
-  };
-  static Place place(const BlockKey& key, int x, int y, int z) {
-    const auto block = [](int i) { return i < 0 ? -1 : i / kBlockSide; };
-    const auto rest = [&](int i) { return i - block(i) * kBlockSide; };
-    return {{key.x + block(x), key.y + block(y), key.z + block(z)}, Block::index(rest(x), rest(y), rest(z))};
-  }
 
   // Blocks about a key, to look voxels up without searching for each.
   class Neighbours {
@@ -105,7 +93,6 @@ class Extraction {
     point.provenance = nearest->provenance();
     if (point.provenance != Provenance::kInvented && weight < 8.0F * static_cast<float>(options_.min_weight))
       return std::nullopt;
-    if (point.provenance == Provenance::kInvented && !options_.keep_invented) return std::nullopt;
     point.label = nearest->label();
     if (!options_.keep_movable && movable_of(point.label) != Movable::kNone) return std::nullopt;
     const auto position = crossing(corners);
@@ -162,10 +149,12 @@ class Extraction {
             cv::saturate_cast<std::uint8_t>(sum[2] / all)};
   }
 
+  // Of a cube by its place about a block; it may lie in one before it.
   std::uint32_t point_at(const BlockKey& key, int x, int y, int z) const {
-    const Place at = place(key, x, y, z);
-    const auto found = places_.find(at.key);
-    return found == places_.end() ? kNoPoint : found->second[at.index];
+    const auto block = [](int i) { return i < 0 ? -1 : 0; };
+    const auto rest = [&](int i) { return i - block(i) * kBlockSide; };
+    const auto found = places_.find({key.x + block(x), key.y + block(y), key.z + block(z)});
+    return found == places_.end() ? kNoPoint : found->second[Block::index(rest(x), rest(y), rest(z))];
   }
 
   void add_triangles(const BlockKey& key) {
@@ -203,14 +192,14 @@ class Extraction {
   }
 
   const VoxelMap& map_;
-  const SurfaceOptions& options_;
+  const DenseOptions& options_;
   float deepest_;
   std::unordered_map<BlockKey, Places, BlockKeyHash> places_;
   Surface surface_;
 };
 }  // namespace
 
-Surface extract_surface(const VoxelMap& map, const SurfaceOptions& options) {
+Surface extract_surface(const VoxelMap& map, const DenseOptions& options) {
   return Extraction(map, options).run();
 }
 
@@ -227,6 +216,13 @@ Surface kept(const Surface& surface, const std::vector<bool>& keep) {
     if (keep[t[0]] && keep[t[1]] && keep[t[2]])
       result.triangles.push_back({moved[t[0]], moved[t[1]], moved[t[2]]});
   return result;
+}
+
+Surface without_invented(const Surface& surface) {
+  std::vector<bool> keep;
+  keep.reserve(surface.points.size());
+  for (const SurfacePoint& point : surface.points) keep.push_back(point.provenance != Provenance::kInvented);
+  return kept(surface, keep);
 }
 
 }  // namespace roslam

@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "roslam/cloud/dense_options.hpp"
 #include "roslam/cloud/voxel_map.hpp"
 #include "roslam/restoration/provenance.hpp"
 
@@ -28,17 +29,14 @@ struct Surface {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-struct SurfaceOptions {
-  double min_weight = 0.1;    ///< of the voxels about a point, as DenseOptions says
-  bool keep_movable = false;  ///< as DenseOptions says
-  bool keep_invented = true;
-};
-
 /// The surfaces in a voxel map by naive surface nets (Gibson 1998): a point in each cube of eight voxels that
 /// a surface passes through, a square of two triangles about each edge between voxels that it cuts.
-Surface extract_surface(const VoxelMap& map, const SurfaceOptions& options);
+Surface extract_surface(const VoxelMap& map, const DenseOptions& options);
 
 /// Without the points that keep says no to, and the triangles they are corners of. keep: one a point.
 Surface kept(const Surface& surface, const std::vector<bool>& keep);
+
+/// What was seen, in one view or another.
+Surface without_invented(const Surface& surface);
 
 }  // namespace roslam

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "roslam/geometry/motion.hpp"
+
 namespace roslam {
 
 namespace {
@@ -22,15 +24,13 @@ VisibilityCheck::VisibilityCheck(const Surface& surface, double voxel_size, cons
       seen_through_(surface.points.size()) {}
 
 void VisibilityCheck::ask(const DenseView& view, const SE3& T_world_camera) {
-  const SE3 T_camera_world = T_world_camera.inverse();
-  const Eigen::Matrix3f rotation = T_camera_world.rotation().toRotationMatrix().cast<float>();
-  const Eigen::Vector3f translation = T_camera_world.translation().cast<float>();
+  const Motion camera_from_world(T_world_camera.inverse());
   const auto fx = static_cast<float>(view.camera.fx), fy = static_cast<float>(view.camera.fy);
   const auto cx = static_cast<float>(view.camera.cx) + 0.5F, cy = static_cast<float>(view.camera.cy) + 0.5F;
   const auto columns = static_cast<float>(view.depth.cols), rows = static_cast<float>(view.depth.rows);
   for (std::size_t i = 0; i < surface_.points.size(); ++i) {
     const SurfacePoint& point = surface_.points[i];
-    const Eigen::Vector3f at = rotation * point.position + translation;
+    const Eigen::Vector3f at = camera_from_world * point.position;
     if (at.z() < kNearest) continue;
     const float u = at.x() / at.z() * fx + cx, v = at.y() / at.z() * fy + cy;
     if (!(u >= 0.0F && v >= 0.0F && u < columns && v < rows)) continue;
@@ -39,7 +39,7 @@ void VisibilityCheck::ask(const DenseView& view, const SE3& T_world_camera) {
     const bool is_invented =
         view.provenance.at<std::uint8_t>(row, column) == static_cast<std::uint8_t>(Provenance::kInvented);
     if (depth == 0.0F || is_invented) continue;
-    const float cosine = std::abs((rotation * point.normal).dot(at)) / at.norm();
+    const float cosine = std::abs((camera_from_world.rotation * point.normal).dot(at)) / at.norm();
     const auto sigma = static_cast<float>(noise_.sigma_of_depth(static_cast<double>(depth)));
     const float tolerance = kDeviations * sigma + voxel_size_ / std::max(cosine, kFlattest);
     if (depth - at.z() > tolerance) {

@@ -5,22 +5,12 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "roslam/geometry/motion.hpp"
 #include "roslam/geometry/pixel_rays.hpp"
 #include "roslam/restoration/reprojection_options.hpp"
 #include "roslam/restoration/view.hpp"
 
 namespace roslam {
-
-/// A rigid motion in single precision.
-struct Motion {
-  Eigen::Matrix3f rotation;
-  Eigen::Vector3f translation;
-
-  explicit Motion(const SE3& motion)
-      : rotation(motion.rotation().toRotationMatrix().cast<float>()),
-        translation(motion.translation().cast<float>()) {}
-  Eigen::Vector3f operator*(const Eigen::Vector3f& point) const { return rotation * point + translation; }
-};
 
 /// How a source sees a point of the target.
 struct Sighting {
