@@ -16,8 +16,8 @@ namespace roslam::street {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr std::array<const char*, 5> kResults{"trajectory.txt", "keyframes.txt", "map.ply", "run.json",
-                                              "trajectory.png"};
+constexpr std::array<const char*, 7> kResults{"trajectory.txt", "keyframes.txt", "map.ply",    "run.json",
+                                              "trajectory.png", "dense.ply",     "report.html"};
 
 class Output : public Dataset {
  protected:

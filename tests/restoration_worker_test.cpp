@@ -54,7 +54,7 @@ class Worker : public testing::Test {
         stage_.camera(), options, mode, inpainter_,
         [this](const std::vector<KeyframeId>& ids) {
           const std::scoped_lock lock(mutex_);
-          std::vector<RestorationWorker::Placed> places;
+          std::vector<KeyframePlace> places;
           for (const KeyframeId id : ids)
             places.push_back({worlds_.count(id.value) > 0 ? worlds_.at(id.value) : WorldId{0},
                               shift_ * places_.at(id.value)});

@@ -17,8 +17,8 @@ namespace fs = std::filesystem;
 
 std::vector<std::string> run_arguments(const BenchmarkSequence& sequence, const BenchmarkSettings& settings,
                                        const fs::path& out) {
-  std::vector<std::string> arguments{"run",     sequence.source, "--out",         out.string(),
-                                     "--quiet", "--dynamic",     settings.dynamic};
+  std::vector<std::string> arguments{"run",     sequence.source, "--out",     out.string(),
+                                     "--quiet", "--no-dense",    "--dynamic", settings.dynamic};
   const auto add = [&](const std::string& option, const std::string& value) {
     arguments.push_back(option);
     arguments.push_back(value);

@@ -15,11 +15,15 @@
 #include "roslam/atlas/map_file.hpp"
 #include "roslam/error.hpp"
 #include "roslam/pipeline/removal_log.hpp"
+#include "roslam/restoration/restoration_picture.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
+#include "roslam/sources/image_file.hpp"
 
 namespace roslam::app {
 
 namespace {
+constexpr const char* kRestorationStrip = "restoration.jpg";
+
 // A run without a single pose is no success, whatever was written.
 void require_poses(const Slam& slam, const RunSummary& summary, const FrameSource& source,
                    const std::string& name) {
@@ -90,22 +94,48 @@ RunSummary track(FrameSource& source, Slam& slam, std::optional<RemovalLog>& log
       stop);
 }
 
-// Shared with the thread that restores.
-std::shared_ptr<RestoredFolder> begin_restoration(Flight& flight, const FlightArguments& arguments,
-                                                  const RunFolder& run) {
+// Pictures of keyframes that are restored; shared with the thread that restores.
+struct Restorations {
+  RestorationStrip strip;
+  std::optional<RestoredFolder> folder;  // where --restore asks for it
+};
+
+// Null if nothing is restored.
+std::shared_ptr<Restorations> begin_restoration(Flight& flight, const FlightArguments& arguments,
+                                                const RunFolder& run) {
   const auto path = run.path() / "restored";
   RestoredFolder::require_apart(path, arguments.source.name);
   RestoredFolder::remove_old(path);
-  if (!arguments.restore) return nullptr;
-  auto folder = std::make_shared<RestoredFolder>(path, flight.source->camera());
+  const Options& options = flight.slam->options();
+  const bool is_for_map = options.dense.enabled && options.dense.restore && options.dense.remove;
+  if (!(arguments.restore || is_for_map) || !options.removal.is_on() || !options.keyframes.enabled)
+    return nullptr;
+  auto result = std::make_shared<Restorations>();
+  if (arguments.restore) result->folder.emplace(path, flight.source->camera());
   flight.slam->restore_keyframes(
-      open_inpainter(arguments.models), [folder](const RestoredKeyframe& keyframe) {
-        folder->add(keyframe.frame, keyframe.view, time_text(keyframe.frame.timestamp));
+      open_inpainter(arguments.models), [result](const RestoredKeyframe& keyframe) {
+        result->strip.add(keyframe.frame.colour, keyframe.view);
+        if (result->folder)
+          result->folder->add(keyframe.frame, keyframe.view, time_text(keyframe.frame.timestamp));
       });
-  return folder;
+  return result;
 }
 
-void end_restoration(Flight& flight, RestoredFolder& folder) {
+void write_strip(const RestorationStrip& restorations, const std::filesystem::path& file) {
+  const cv::Mat strip = restorations.strip();
+  if (strip.empty()) return;
+  try {
+    write_image(file, strip);
+  } catch (const OutputError&) {
+    std::filesystem::remove(file);  // on a full disk the trajectory needs the room more
+    throw;
+  }
+}
+
+void end_restoration(Flight& flight, Restorations& restorations, const RunFolder& run) {
+  write_strip(restorations.strip, run.path() / kRestorationStrip);
+  if (!restorations.folder) return;
+  RestoredFolder& folder = *restorations.folder;
   flight.restored = folder.frames();
   const nlohmann::ordered_json report{{"source", flight.description.source},
                                       {"method", kInFlight},
@@ -121,6 +151,7 @@ Options options_of(const FlightArguments& arguments) {
   if (!arguments.dynamic.empty()) options.removal = *removal_from(arguments.dynamic, options.removal);
   if (arguments.no_loops) options.loop.enabled = false;
   if (arguments.localise_only) options.keyframes.enabled = false;
+  if (arguments.no_dense) options.dense.enabled = false;
   return options;
 }
 
@@ -137,9 +168,11 @@ Flight fly(const FlightArguments& arguments, Options options, const std::string&
   flight.slam = std::make_unique<Slam>(flight.source->camera(), options, mode, segmenter,
                                        open_vocabulary(arguments, options));
   if (map) flight.slam->continue_from(std::move(*map));
+  if (options.dense.enabled && options.keyframes.enabled) flight.slam->map_densely();
   const auto restored = begin_restoration(flight, arguments, folder);
   std::optional<RemovalLog> log;
   RemovalLog::remove_old(folder.path());
+  std::filesystem::remove(folder.path() / kRestorationStrip);
   if (options.removal.is_on())
     log.emplace(RemovalLog::Settings{folder.path(), mode, flight.source->camera().fps, arguments.video});
   flight.summary = track(*flight.source, *flight.slam, log, arguments.quiet, stop);
@@ -153,7 +186,7 @@ Flight fly(const FlightArguments& arguments, Options options, const std::string&
     }
   };
   if (log) attempt([&] { log->finish(); });
-  if (restored) attempt([&] { end_restoration(flight, *restored); });
+  if (restored) attempt([&] { end_restoration(flight, *restored, folder); });
   if (log) flight.summary.removal = log->tally();
   folder.write(*flight.slam, flight.summary, *flight.source, flight.description);
   if (failure) std::rethrow_exception(failure);

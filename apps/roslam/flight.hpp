@@ -26,9 +26,10 @@ struct FlightArguments {
   bool localise_only = false;
   std::string dynamic;  ///< empty: as the options say
   bool video = false;
-  bool restore = false;  ///< write the keyframes without what moves to the folder restored
-  std::string models;    ///< folder of the networks that paint, in place of the shipped ones
-  bool quiet = false;    ///< no progress
+  bool no_dense = false;  ///< make no dense map
+  bool restore = false;   ///< write the keyframes without what moves to the folder restored
+  std::string models;     ///< folder of the networks that paint, in place of the shipped ones
+  bool quiet = false;     ///< no progress
 };
 
 /// A flight that came to its end.

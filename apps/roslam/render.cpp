@@ -23,7 +23,7 @@ constexpr auto kExamples = R"(Examples:
   roslam render dense.ply --view follow --trajectory run/trajectory.txt --out flight.png
   roslam render cloud.ply --point-size 0.01 --out cloud.png
 
-MAP is a PLY file, RO-SLAM's or another's. The world's z axis is taken to point up. Views: top, from straight above; front,
+MAP is a PLY file, RO-SLAM's or another's. Its level surfaces tell what is up. Views: top, from straight above; front,
 from above and behind the first pose; follow, a sheet of six views from above and behind poses along the flight.
 Colours: rgb, height, class (as the segmentation network labels), provenance (measured grey, seen at another time green,
 invented magenta).

@@ -36,9 +36,9 @@ class Measurement {
     RestoredSequence result{sequence_, {}, "", ""};
     try {
       if (sequence_.is_simulated()) render();
-      call(
-          {"run", sequence_.source, "--camera", sequence_.camera, "--out", folder("run").string(), "--quiet"},
-          "run");
+      call({"run", sequence_.source, "--camera", sequence_.camera, "--out", folder("run").string(),
+            "--no-dense", "--quiet"},
+           "run");
       for (const auto& method : settings_.methods) result.results.push_back(measure_method(method));
       result.figure = draw();
     } catch (const OutputError&) {

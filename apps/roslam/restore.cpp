@@ -86,6 +86,7 @@ fs::path run_folder_of(const RestoreArguments& arguments, const std::string& ver
   if (RecordedRun::recognises(name)) return name;
   FlightArguments flight = arguments.flight;
   flight.out = (arguments.out / "run").string();
+  flight.no_dense = true;
   fly(flight, options_of(flight), version, stop);
   return flight.out;
 }

@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "apps/roslam/output.hpp"
 #include "roslam/error.hpp"
-#include "roslam/restoration/restoration_picture.hpp"
 #include "roslam/sources/image_file.hpp"
 #include "roslam/write_file.hpp"
 
@@ -18,8 +16,6 @@ namespace roslam::app {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr std::size_t kPictures = 6;  // of before and after; twice as many are kept until the end
-constexpr int kPictureWidth = 1200;   // pixels
 constexpr const char* kProvenance = "provenance";
 constexpr const char* kReport = "restoration.json";
 
@@ -94,21 +90,7 @@ void RestoredFolder::add(const Frame& frame, const RestoredView& restored, const
   pixels_ += restored.colour.total();
   reprojected_ += restored.pixels_of(Provenance::kReprojected);
   invented_ += restored.pixels_of(Provenance::kInvented);
-  keep_picture(frame, restored);
-}
-
-// Frames spread over the sequence, however long it turns out to be.
-void RestoredFolder::keep_picture(const Frame& frame, const RestoredView& restored) {
-  if (restored.pixels_of(Provenance::kMeasured) == restored.colour.total()) return;
-  if (with_holes_++ % stride_ != 0) return;
-  cv::Mat picture = restoration_picture(frame.colour, restored);
-  const double scale = static_cast<double>(kPictureWidth) / picture.cols;
-  cv::resize(picture, picture, {}, scale, scale, cv::INTER_AREA);
-  pictures_.push_back(picture);
-  if (pictures_.size() < 2 * kPictures) return;
-  for (std::size_t i = 0; i < kPictures; ++i) pictures_[i] = pictures_[2 * i];
-  pictures_.resize(kPictures);
-  stride_ *= 2;
+  pictures_.add(frame.colour, restored);
 }
 
 void RestoredFolder::close(const std::string& report) {
@@ -119,13 +101,8 @@ void RestoredFolder::close(const std::string& report) {
     remove_left(folder_ / "depth");
   }
   write_file(folder_ / kReport, report);
-  if (pictures_.empty()) return;
-  std::vector<cv::Mat> chosen;
-  const std::size_t count = std::min(kPictures, pictures_.size());
-  for (std::size_t i = 0; i < count; ++i) chosen.push_back(pictures_[i * pictures_.size() / count]);
-  cv::Mat strip;
-  cv::vconcat(chosen, strip);
-  write_image(folder_ / "before_after.jpg", strip);
+  if (const cv::Mat strip = pictures_.strip(); !strip.empty())
+    write_image(folder_ / "before_after.jpg", strip);
 }
 
 }  // namespace roslam::app

@@ -6,10 +6,10 @@
 #include <opencv2/core.hpp>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "apps/roslam/tum_writer.hpp"
 #include "roslam/geometry/camera.hpp"
+#include "roslam/restoration/restoration_picture.hpp"
 #include "roslam/restoration/static_scene_restorer.hpp"
 #include "roslam/sources/frame_source.hpp"
 
@@ -51,8 +51,6 @@ class RestoredFolder {
   std::size_t invented() const { return invented_; }
 
  private:
-  void keep_picture(const Frame& frame, const RestoredView& restored);
-
   std::filesystem::path folder_;
   Camera camera_;
   TextFile colours_, depths_;
@@ -60,9 +58,7 @@ class RestoredFolder {
   bool has_depth_ = false;
   std::size_t frames_ = 0;
   std::size_t pixels_ = 0, reprojected_ = 0, invented_ = 0;
-  std::vector<cv::Mat> pictures_;
-  std::size_t with_holes_ = 0;
-  std::size_t stride_ = 1;  // every so many frames with holes one picture is kept
+  RestorationStrip pictures_;
 };
 
 }  // namespace roslam::app

@@ -39,6 +39,19 @@ void print_map(const Slam& slam, bool has_map) {
               slam.map().landmark_count());
 }
 
+void print_dense(const DenseMap& dense) {
+  std::printf("dense map: %zu points, voxels of %g m, %zu keyframes", dense.surface.points.size(),
+              dense.voxel_size, dense.keyframes);
+  if (dense.dropped > 0) std::printf(", %zu dropped", dense.dropped);
+  std::printf("\n");
+  if (dense.keyframes == 0) std::printf("note: the dense map is empty: no keyframe has depth\n");
+  if (dense.times_coarsened > 0)
+    std::printf("note: voxels were made %d times as large, for the map to keep within dense.max_memory\n",
+                1 << dense.times_coarsened);
+  for (const auto& [fault, count] : dense.faults)
+    std::printf("note: not in the dense map: %s (%zu times)\n", fault.c_str(), count);
+}
+
 void print_restoration(const Flight& flight) {
   std::printf("restored: %zu keyframes, %zu dropped\n", flight.restored, flight.slam->unrestored());
   for (const auto& [fault, count] : flight.slam->restoration_faults())
@@ -63,6 +76,7 @@ void print_summary(const Slam& slam, const RunSummary& summary, const std::strin
     std::printf("note: %s (%zu times)\n", fault.c_str(), count);
   }
   print_map(slam, has_map);
+  if (summary.dense) print_dense(*summary.dense);
   if (const auto found = times.find("tracking"); found != times.end()) {
     std::printf("tracking: median %.1f ms, p95 %.1f ms of processor time a frame\n", found->second.median_ms,
                 found->second.p95_ms);
@@ -79,8 +93,9 @@ void check(const FlightArguments& arguments, const Options& options) {
   if (!arguments.vocabulary.empty() && !options.loop.enabled) {
     throw CLI::ValidationError("--vocabulary", "needs loop.enabled");
   }
-  if (!arguments.models.empty() && !arguments.restore)
-    throw CLI::ValidationError("--models", "needs --restore");
+  const bool restores = arguments.restore || (options.dense.enabled && options.dense.restore);
+  if (!arguments.models.empty() && !restores)
+    throw CLI::ValidationError("--models", "needs --restore or a dense map with dense.restore");
   if (arguments.restore && !options.keyframes.enabled)
     throw CLI::ValidationError("--restore", "restores keyframes, of which --localise-only makes none");
   if (arguments.restore && !options.removal.is_on())
@@ -122,8 +137,8 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n"
       "  roslam run my_flight --camera my_camera.yaml --real-time --out live\n"
       "  roslam run another_flight --map live/map.roslam --out further\n"
-      "RUN then holds trajectory.txt and keyframes.txt (TUM format), map.ply, map.roslam, trajectory.png and "
-      "run.json.\n"
+      "RUN then holds trajectory.txt and keyframes.txt (TUM format), dense.ply (the dense map), map.ply,\n"
+      "map.roslam, trajectory.png and run.json.\n"
       "Ctrl-C ends the run early and writes what was computed so far (exit code 0, \"interrupted\" in "
       "run.json).");
   add_source_options(*command, arguments->flight.source);
@@ -163,13 +178,15 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command->add_flag("--print-config", arguments->print_config, "Print the effective options and stop");
   command->add_flag("--video", arguments->flight.video,
                     "Write removal.avi too: each frame with what was kept and what was removed");
+  command->add_flag("--no-dense", arguments->flight.no_dense,
+                    "Make no dense map, and restore no keyframes for it");
   command->add_flag(
       "--restore", arguments->flight.restore,
-      "Fill what the removal leaves open in each keyframe, from those before it and by a network, and write "
-      "them to RUN/restored; roslam restore does more, afterwards, with all frames");
+      "Write the keyframes as they go into the dense map to RUN/restored: what the removal leaves open is "
+      "filled from those before and by a network; roslam restore does more, afterwards, with all frames");
   command->add_option(
       "--models", arguments->flight.models,
-      "Folder of the networks that --restore paints with, in place of those that come with the program");
+      "Folder of the networks that paint what nobody saw, in place of those that come with the program");
   command->add_flag("--quiet", arguments->flight.quiet, "No progress");
   command->add_flag("--json", arguments->json, "Print the report as one JSON object");
   command->callback([arguments, version] { execute(*arguments, version); });

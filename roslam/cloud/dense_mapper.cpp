@@ -40,6 +40,8 @@ void DenseOptions::validate() const {
   require(truncation >= 2.0 && truncation <= 20.0, "truncation must be 2 to 20 voxels");
   require(min_weight >= 0.0 && min_weight <= 60.0, "min_weight must be 0 to 60");
   require(follow > 0.0 && follow <= 100.0, "follow must be above 0 and at most 100 voxels");
+  require(follow_every >= 1 && follow_every <= 100000, "follow_every must be 1 to 100000 keyframes");
+  require(queue >= 1 && queue <= 10000, "queue must be 1 to 10000 keyframes");
   require(max_memory >= 16 && max_memory <= 1000000, "max_memory must be 16 to 1000000 MB");
 }
 

@@ -11,14 +11,9 @@
 #include "roslam/cloud/voxel_map.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "roslam/map/ids.hpp"
+#include "roslam/map/keyframe_place.hpp"
 
 namespace roslam {
-
-/// Where a keyframe is: the world it is in, and its pose there.
-struct KeyframePlace {
-  WorldId world;
-  SE3 T_world_camera;
-};
 
 /// Fuses keyframes into a dense map for each world, and follows when they move: what they touched is fused
 /// anew, so that the map is as if all had been fused where they are by now. Not safe to call from several

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "roslam/error.hpp"
+#include "roslam/geometry/motion.hpp"
 #include "roslam/restoration/provenance.hpp"
 #include "roslam/restoration/view.hpp"
 #include "roslam/semantics/label_set.hpp"
@@ -64,7 +65,10 @@ DenseView unpack(const PackedView& packed) {
 }
 
 ViewReducer::ViewReducer(const Camera& camera, const DenseOptions& dense, const DepthOptions& depth)
-    : depth_(with_limit(depth, dense.max_depth)), reduced_(reduced_camera(camera, dense.stride)) {
+    : depth_(with_limit(depth, dense.max_depth)),
+      rays_(camera),
+      reduced_(reduced_camera(camera, dense.stride)),
+      reduced_rays_(reduced_) {
   map_x_.create(reduced_.height, reduced_.width, CV_32FC1);
   map_y_.create(map_x_.size(), CV_32FC1);
   for (int y = 0; y < reduced_.height; ++y) {
@@ -95,6 +99,21 @@ DenseView ViewReducer::reduce(const cv::Mat& colour, const cv::Mat& depth, const
   view.provenance = nearest(provenance, static_cast<double>(Provenance::kMeasured));
   view.labels.setTo(kVoid, view.provenance != static_cast<double>(Provenance::kMeasured));
   return view;
+}
+
+void ViewReducer::label(DenseView& view, const cv::Mat& labels, const SE3& T_labelled_camera) const {
+  const Motion labelled_from_camera(T_labelled_camera);
+  for (int y = 0; y < view.depth.rows; ++y) {
+    for (int x = 0; x < view.depth.cols; ++x) {
+      const float depth = view.depth.at<float>(y, x);
+      const bool is_measured =
+          view.provenance.at<std::uint8_t>(y, x) == static_cast<std::uint8_t>(Provenance::kMeasured);
+      if (depth <= 0.0F || !is_measured) continue;
+      const auto pixel = rays_.pixel(labelled_from_camera * reduced_rays_.point(x, y, depth));
+      if (!pixel) continue;
+      view.labels.at<std::uint8_t>(y, x) = labels.at<std::uint8_t>(cvRound(pixel->y()), cvRound(pixel->x()));
+    }
+  }
 }
 
 }  // namespace roslam

@@ -9,6 +9,8 @@
 #include "roslam/cloud/dense_options.hpp"
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/pixel_rays.hpp"
+#include "roslam/geometry/se3.hpp"
 
 namespace roslam {
 
@@ -44,9 +46,15 @@ class ViewReducer {
   DenseView reduce(const cv::Mat& colour, const cv::Mat& depth, const cv::Mat& labels,
                    const cv::Mat& provenance, const cv::Mat& hidden) const;
 
+  /// Labels what was measured by a picture taken elsewhere. labels: CV_8UC1 of the camera's size.
+  /// T_labelled_camera: from where the view was taken to where the labelled picture was.
+  void label(DenseView& view, const cv::Mat& labels, const SE3& T_labelled_camera) const;
+
  private:
   DepthOptions depth_;
+  PixelRays rays_;  // of the picture as taken
   Camera reduced_;
+  PixelRays reduced_rays_;
   cv::Mat map_x_, map_y_;  // where a pixel of the smaller picture lies in the picture as taken
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/cloud/map_picture.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "roslam/geometry/motion.hpp"
+#include "roslam/restoration/provenance.hpp"
 #include "roslam/semantics/label_set.hpp"
 
 namespace roslam {
@@ -23,10 +25,10 @@ constexpr std::array kNames{std::pair{"rgb", MapColour::kRgb}, std::pair{"height
                             std::pair{"provenance", MapColour::kProvenance}};
 
 // Heights that all but a few points lie between.
-std::pair<float, float> usual_heights(const Surface& surface) {
+std::pair<float, float> usual_heights(const Surface& surface, const Eigen::Vector3f& up) {
   std::vector<float> heights;
   heights.reserve(surface.points.size());
-  for (const SurfacePoint& point : surface.points) heights.push_back(point.position.z());
+  for (const SurfacePoint& point : surface.points) heights.push_back(up.dot(point.position));
   if (heights.empty()) return {0.0F, 1.0F};
   const auto at = [&](double share) {
     const auto n =
@@ -45,11 +47,6 @@ cv::Vec3b rainbow(float share) {
   return colour.at<cv::Vec3b>(0);
 }
 
-cv::Vec3b provenance_colour(Provenance provenance) {
-  if (provenance == Provenance::kMeasured) return {200, 200, 200};
-  return provenance == Provenance::kReprojected ? cv::Vec3b(80, 200, 80) : cv::Vec3b(220, 60, 220);
-}
-
 // Light from above and behind the camera, so that colours that stand for something show shapes too.
 cv::Vec3b lit(const cv::Vec3b& colour, const Eigen::Vector3f& normal) {
   const float light = 0.55F + 0.45F * std::abs(normal.dot(Eigen::Vector3f(0.4F, 0.3F, 0.87F)));
@@ -62,7 +59,8 @@ class Painter {
  public:
   Painter(const Surface& surface, MapColour colour) : colour_(colour) {
     if (colour != MapColour::kHeight) return;
-    std::tie(low_, high_) = usual_heights(surface);
+    up_ = up_of(surface);
+    std::tie(low_, high_) = usual_heights(surface, up_);
     for (std::size_t i = 0; i < heights_.size(); ++i)
       heights_[i] = rainbow(static_cast<float>(i) / static_cast<float>(heights_.size() - 1));
   }
@@ -78,13 +76,14 @@ class Painter {
       case MapColour::kHeight:
         break;
     }
-    const float share = std::clamp((point.position.z() - low_) / (high_ - low_), 0.0F, 1.0F);
+    const float share = std::clamp((up_.dot(point.position) - low_) / (high_ - low_), 0.0F, 1.0F);
     return lit(heights_[static_cast<std::size_t>(share * static_cast<float>(heights_.size() - 1))],
                point.normal);
   }
 
  private:
   MapColour colour_;
+  Eigen::Vector3f up_ = Eigen::Vector3f::UnitZ();
   float low_ = 0.0F, high_ = 1.0F;
   std::array<cv::Vec3b, 256> heights_{};
 };
@@ -102,11 +101,33 @@ std::vector<std::string> map_colour_names() {
   return result;
 }
 
+Eigen::Vector3f up_of(const Surface& surface) {
+  constexpr std::array kNarrowing{35.0F, 20.0F, 10.0F, 5.0F};  // degrees around what is up so far
+  constexpr std::size_t kEnough = 200;                         // points of level surfaces
+  constexpr float kDegree = static_cast<float>(M_PI / 180.0);
+  Eigen::Vector3f up = Eigen::Vector3f::UnitZ();
+  for (const float angle : kNarrowing) {
+    const float least = std::cos(angle * kDegree);
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    std::size_t count = 0;
+    for (const SurfacePoint& point : surface.points) {
+      if (!(point.normal.dot(up) >= least)) continue;
+      sum += point.normal;
+      ++count;
+    }
+    if (count < kEnough) break;
+    up = sum.normalized();
+  }
+  return up;
+}
+
 MapView top_view(const Surface& surface, const cv::Size& size) {
+  const Eigen::Matrix3f level =
+      Eigen::Quaternionf::FromTwoVectors(up_of(surface), Eigen::Vector3f::UnitZ()).toRotationMatrix();
   Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
   for (const SurfacePoint& point : surface.points) {
-    low = low.cwiseMin(point.position);
-    high = high.cwiseMax(point.position);
+    low = low.cwiseMin(level * point.position);
+    high = high.cwiseMax(level * point.position);
   }
   if (surface.points.empty()) low = high = Eigen::Vector3f::Zero();
   constexpr double kMargin = 1.05;
@@ -124,7 +145,9 @@ MapView top_view(const Surface& surface, const cv::Size& size) {
   Eigen::Matrix3d down;
   down << 1, 0, 0, 0, -1, 0, 0, 0, -1;
   const Eigen::Vector3d middle = (0.5F * (low + high)).cast<double>();
-  view.T_world_camera = SE3(down, {middle.x(), middle.y(), static_cast<double>(low.z()) + above});
+  const SE3 T_level_camera(down, {middle.x(), middle.y(), static_cast<double>(low.z()) + above});
+  view.T_world_camera =
+      SE3(Eigen::Matrix3d(level.transpose().cast<double>()), Eigen::Vector3d::Zero()) * T_level_camera;
   return view;
 }
 

@@ -31,7 +31,12 @@ struct MapView {
   SE3 T_world_camera;
 };
 
-/// From straight above, all of the map in the picture: x to the right, y up (world frame, z up).
+/// The direction that is up in a map: that of its level surfaces, where it has such within 35 degrees of the
+/// world's z axis, for the first camera need not have been level; else the z axis. Unit length.
+Eigen::Vector3f up_of(const Surface& surface);
+
+/// From straight above, all of the map in the picture: the world's x to the right, y up, as far as the map is
+/// level.
 MapView top_view(const Surface& surface, const cv::Size& size);
 
 /// From above and behind a camera that looked at the map, in the direction it looked.

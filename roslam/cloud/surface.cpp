@@ -218,6 +218,12 @@ Surface kept(const Surface& surface, const std::vector<bool>& keep) {
   return result;
 }
 
+std::map<Provenance, std::size_t> count_by_provenance(const Surface& surface) {
+  std::map<Provenance, std::size_t> points;
+  for (const SurfacePoint& point : surface.points) ++points[point.provenance];
+  return points;
+}
+
 Surface without_invented(const Surface& surface) {
   std::vector<bool> keep;
   keep.reserve(surface.points.size());

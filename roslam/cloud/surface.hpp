@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -38,5 +39,8 @@ Surface kept(const Surface& surface, const std::vector<bool>& keep);
 
 /// What was seen, in one view or another.
 Surface without_invented(const Surface& surface);
+
+/// Points of each provenance.
+std::map<Provenance, std::size_t> count_by_provenance(const Surface& surface);
 
 }  // namespace roslam

@@ -37,6 +37,7 @@ void Options::validate() const {
   reprojection.validate();
   invention.validate();
   depth_completion.validate();
+  dense.validate();
   threads.validate();
 }
 

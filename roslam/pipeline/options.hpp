@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include "roslam/cloud/dense_options.hpp"
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/geometry/reprojection.hpp"
@@ -57,6 +58,7 @@ struct Options {
   ReprojectionOptions reprojection;
   InventionOptions invention;
   DepthCompletionOptions depth_completion;
+  DenseOptions dense;
   ThreadOptions threads;
 
   /// Throws OptionsError naming the first field out of range.

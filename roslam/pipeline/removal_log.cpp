@@ -15,8 +15,8 @@ namespace roslam {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr std::size_t kQueue = 30;         // frames that may wait to be written
-constexpr std::size_t kStripPictures = 8;  // of which twice as many are kept until the end
+constexpr std::size_t kQueue = 30;  // frames that may wait to be written
+constexpr std::size_t kStripPictures = 8;
 constexpr const char* kFullDisk = ": cannot be written in full; check the free space on the disk";
 constexpr const char* kStrip = "removal.jpg";
 constexpr const char* kVideo = "removal.avi";
@@ -33,7 +33,7 @@ void RemovalLog::remove_old(const fs::path& folder) {
   }
 }
 
-RemovalLog::RemovalLog(const Settings& settings) : settings_(settings) {
+RemovalLog::RemovalLog(const Settings& settings) : settings_(settings), strip_(kStripPictures) {
   remove_old(settings.folder);
   make_folder(settings.folder / kMaskFolder);
   lines_.open(settings.folder / kDescriptorFile, std::ios::binary);
@@ -47,21 +47,8 @@ RemovalLog::~RemovalLog() {
   changed_.notify_all();
 }
 
-// Pictures are spread over a run whose length nobody knows: when there are too many, every other one goes.
-bool RemovalLog::is_for_strip() {
-  if (frames_ % strip_stride_ != 0) return false;
-  if (strip_size_ == 2 * kStripPictures) {
-    strip_stride_ *= 2;
-    strip_size_ /= 2;
-    if (frames_ % strip_stride_ != 0) return false;
-  }
-  ++strip_size_;
-  return true;
-}
-
 void RemovalLog::add(const Frame& frame, const FrameResult& result) {
-  Entry entry{{}, result, frame.colour.size(), is_for_strip()};
-  ++frames_;
+  Entry entry{{}, result, frame.colour.size(), strip_.wants()};
   if (entry.in_strip || settings_.with_video) entry.colour = frame.colour;
   std::unique_lock lock(mutex_);
   const auto has_room = [&] { return queue_.size() < kQueue || failure_; };
@@ -118,14 +105,7 @@ void RemovalLog::write(const Entry& entry) {
 void RemovalLog::write_picture(const Entry& entry) {
   const cv::Mat picture =
       removal_picture(entry.colour, entry.result.removal, entry.result.points, entry.result.removed_points);
-  if (entry.in_strip) {
-    strip_.push_back(picture);
-    if (strip_.size() > 2 * kStripPictures) {
-      std::vector<cv::Mat> half;
-      for (std::size_t i = 0; i < strip_.size(); i += 2) half.push_back(strip_[i]);
-      strip_ = std::move(half);
-    }
-  }
+  if (entry.in_strip) strip_.add(picture);
   if (!settings_.with_video) return;
   if (!video_.isOpened()) {
     const auto file = settings_.folder / kVideo;
@@ -154,10 +134,8 @@ void RemovalLog::finish() {
     remove_old(settings_.folder);
     std::rethrow_exception(failure_);
   }
-  if (strip_.empty()) return;
-  std::vector<cv::Mat> pictures;
-  const std::size_t count = std::min(strip_.size(), kStripPictures);
-  for (std::size_t i = 0; i < count; ++i) pictures.push_back(strip_[i * strip_.size() / count]);
+  const std::vector<cv::Mat> pictures = strip_.pictures();
+  if (pictures.empty()) return;
   constexpr int kColumns = 4;
   constexpr int kWidth = 400;  // pixels
   write_image(settings_.folder / kStrip, removal_strip(pictures, kColumns, kWidth),

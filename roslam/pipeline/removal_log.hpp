@@ -12,8 +12,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
 #include <thread>
-#include <vector>
 
+#include "roslam/picture_strip.hpp"
 #include "roslam/pipeline/removal_record.hpp"
 #include "roslam/pipeline/slam.hpp"
 
@@ -59,7 +59,6 @@ class RemovalLog {
     bool with_mask = true;
   };
 
-  bool is_for_strip();
   void work();
   void write(const Entry& entry);
   void write_picture(const Entry& entry);
@@ -67,11 +66,8 @@ class RemovalLog {
   Settings settings_;
   RemovalTally tally_;
 
-  std::size_t frames_ = 0;
-  std::size_t strip_stride_ = 1;  // every so many frames one goes into the strip
-  std::size_t strip_size_ = 0;
+  PictureStrip strip_;  // pictures are added by the writing thread
   std::ofstream lines_;
-  std::vector<cv::Mat> strip_;  // by the writing thread
   cv::VideoWriter video_;
   std::mutex mutex_;
   std::condition_variable changed_;

@@ -6,39 +6,38 @@
 
 #include "roslam/geometry/stopwatch.hpp"
 #include "roslam/pipeline/thread_priority.hpp"
-#include "roslam/removal/mask_refinement.hpp"
 
 namespace roslam {
 
-namespace {
-cv::Mat removed_from(const Frame& frame, const Removal& removal, int margin) {
-  if (removal.objects.empty()) return {};
-  cv::Mat mask = cv::Mat::zeros(frame.colour.size(), CV_8UC1);
-  for (const MovableObject& object : removal.objects) paint(object, mask);
-  return dilated(mask, margin);
-}
-}  // namespace
-
 RestorationWorker::RestorationWorker(const Camera& camera, const Options& options, Mode mode,
                                      std::shared_ptr<Inpainter> inpainter, PlacesOf places_of,
-                                     OnRestored on_restored)
+                                     OnRestored on_restored, OnLeft on_left)
     : options_(options.restoration),
       mode_(mode),
       most_sources_(sources_that_fit(options.restoration.recent_sources, camera)),
       restorer_(camera, options.restorer_settings(), std::move(inpainter)),
       places_of_(std::move(places_of)),
       on_restored_(std::move(on_restored)),
+      on_left_(std::move(on_left)),
       worker_([this](KeyframeId keyframe, const auto&, StageTimes& times) { work(keyframe, times); }, mode,
               1) {}
 
 void RestorationWorker::submit(KeyframeId keyframe, const Frame& frame, const Removal& removal) {
+  std::vector<KeyframeId> dropped;
   {
     const std::scoped_lock lock(mutex_);
     waiting_.emplace(keyframe, Job{frame, removal});
-    for (; waiting_.size() > static_cast<std::size_t>(options_.queue); ++dropped_)
+    for (; waiting_.size() > static_cast<std::size_t>(options_.queue); ++dropped_) {
+      dropped.push_back(waiting_.begin()->first);
       waiting_.erase(waiting_.begin());
+    }
   }
+  for (const KeyframeId id : dropped) leave(id);
   worker_.submit(keyframe);
+}
+
+void RestorationWorker::leave(KeyframeId keyframe) const {
+  if (on_left_) on_left_(keyframe);
 }
 
 std::size_t RestorationWorker::dropped() const {
@@ -66,8 +65,11 @@ void RestorationWorker::work(KeyframeId keyframe, StageTimes& times) {
     restore(keyframe, job);
     times.add("restoration", watch.seconds());
   } catch (const std::exception& error) {
-    const std::scoped_lock lock(mutex_);
-    ++faults_[error.what()];
+    {
+      const std::scoped_lock lock(mutex_);
+      ++faults_[error.what()];
+    }
+    leave(keyframe);
   }
 }
 
@@ -75,11 +77,11 @@ void RestorationWorker::restore(KeyframeId keyframe, const Job& job) {
   std::vector<KeyframeId> ids;
   for (const auto& [id, source] : sources_) ids.push_back(id);
   ids.push_back(keyframe);
-  const std::vector<Placed> places = places_of_(ids);
+  const std::vector<KeyframePlace> places = places_of_(ids);
   const auto sources = move_sources(ids, places);
-  const Placed& placed = places.back();
+  const KeyframePlace& placed = places.back();
   const View view{job.frame.timestamp, placed.T_world_camera, job.frame.colour, job.frame.depth,
-                  removed_from(job.frame, job.removal, options_.margin)};
+                  removed_area(job.removal, job.frame.colour.size(), options_.margin)};
   const auto keep = [&] {
     if (auto source = restorer_.source_view(view)) sources_.insert_or_assign(keyframe, std::move(*source));
     while (sources_.size() > most_sources_) sources_.erase(sources_.begin());
@@ -96,7 +98,7 @@ void RestorationWorker::restore(KeyframeId keyframe, const Job& job) {
 
 // Puts the sources where they are by now. Those in the world of the last place, which is that of the target.
 std::vector<const SourceView*> RestorationWorker::move_sources(const std::vector<KeyframeId>& ids,
-                                                               const std::vector<Placed>& places) {
+                                                               const std::vector<KeyframePlace>& places) {
   std::vector<const SourceView*> result;
   for (std::size_t i = 0; i + 1 < ids.size(); ++i) {
     if (places[i].world != places.back().world) continue;

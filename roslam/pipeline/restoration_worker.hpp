@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "roslam/map/ids.hpp"
+#include "roslam/map/keyframe_place.hpp"
 #include "roslam/pipeline/keyframe_worker.hpp"
 #include "roslam/pipeline/options.hpp"
 #include "roslam/pipeline/statistics.hpp"
@@ -33,18 +34,17 @@ struct RestoredKeyframe {
 /// restored keyframe and nothing else. In deterministic mode each is restored at once.
 class RestorationWorker {
  public:
-  struct Placed {
-    WorldId world;
-    SE3 T_world_camera;
-  };
-  /// Where keyframes are by now, all at one moment. Called on the worker's thread.
-  using PlacesOf = std::function<std::vector<Placed>(const std::vector<KeyframeId>&)>;
   /// Takes what was restored, on the worker's thread.
   using OnRestored = std::function<void(const RestoredKeyframe&)>;
+  /// Told of a keyframe that was dropped or could not be restored, on whatever thread that shows. It must not
+  /// throw.
+  using OnLeft = std::function<void(KeyframeId)>;
 
-  /// inpainter: as StaticSceneRestorer. Throws as StaticSceneRestorer does.
+  /// inpainter: as StaticSceneRestorer. places_of: called on the worker's thread. Throws as
+  /// StaticSceneRestorer does.
   RestorationWorker(const Camera& camera, const Options& options, Mode mode,
-                    std::shared_ptr<Inpainter> inpainter, PlacesOf places_of, OnRestored on_restored);
+                    std::shared_ptr<Inpainter> inpainter, PlacesOf places_of, OnRestored on_restored,
+                    OnLeft on_left = {});
 
   /// The images of the frame must not be changed afterwards.
   void submit(KeyframeId keyframe, const Frame& frame, const Removal& removal);
@@ -65,10 +65,11 @@ class RestorationWorker {
     Removal removal;
   };
 
+  void leave(KeyframeId keyframe) const;
   void work(KeyframeId keyframe, StageTimes& times);
   void restore(KeyframeId keyframe, const Job& job);
   std::vector<const SourceView*> move_sources(const std::vector<KeyframeId>& ids,
-                                              const std::vector<Placed>& places);
+                                              const std::vector<KeyframePlace>& places);
 
   RestorationOptions options_;
   Mode mode_;
@@ -76,6 +77,7 @@ class RestorationWorker {
   StaticSceneRestorer restorer_;
   PlacesOf places_of_;
   OnRestored on_restored_;
+  OnLeft on_left_;
   std::map<KeyframeId, SourceView> sources_;  // by the worker's thread
 
   mutable std::mutex mutex_;  // guards what follows

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "roslam/atlas/map_file.hpp"
+#include "roslam/cloud/surface_file.hpp"
 #include "roslam/error.hpp"
 #include "roslam/evaluation/trajectory_plot.hpp"
 #include "roslam/map/map_ply.hpp"
@@ -74,6 +75,10 @@ void RunFolder::write(const Slam& slam, const RunSummary& summary, const FrameSo
       // Perhaps the one that this flight was made in: a map is never lost for want of another.
       {"map.roslam", [&](const Path& file) { save_map(file, slam.snapshot()); },
        if_any(has_new_map, Result::kKept)},
+      {"dense.ply", [&](const Path& file) { write_surface_ply(file, summary.dense->surface, true); },
+       if_any(summary.dense.has_value(), Result::kRemoved)},
+      {"report.html",
+       [&](const Path& file) { write_file(file, run_page(slam, summary, description, path_)); }},
   };
   std::exception_ptr first_failure;
   for (const auto& output : outputs) {

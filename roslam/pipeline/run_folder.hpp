@@ -26,10 +26,12 @@ struct RunDescription {
 ///   trajectory.txt  poses of all tracked frames (TUM format)
 ///   keyframes.txt   poses of the keyframes (TUM format)
 ///   map.ply         landmarks with colour
+///   dense.ply       the dense map, points and triangles, where one was made
 ///   map.roslam      the map, for another flight; kept where there is no new one
 ///   trajectory.png  the way flown, seen from above
 ///   groundtruth.txt the true poses, where the source knows them (TUM format)
 ///   run.json        effective options, counts, times of every stage, memory
+///   report.html     the run to look at: path, errors, times, pictures
 class RunFolder {
  public:
   /// Creates the folder. Throws OutputError at once, before any work is lost, if nothing can be written there
@@ -50,5 +52,9 @@ class RunFolder {
 /// The contents of run.json.
 std::string run_report(const Slam& slam, const RunSummary& summary, const FrameSource& source,
                        const RunDescription& description);
+
+/// The contents of report.html. folder: where the run's pictures are.
+std::string run_page(const Slam& slam, const RunSummary& summary, const RunDescription& description,
+                     const std::filesystem::path& folder);
 
 }  // namespace roslam

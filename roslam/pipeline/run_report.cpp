@@ -110,6 +110,28 @@ Json dynamic_json(const Slam& slam, const RunSummary& summary, const RunDescript
   return json;
 }
 
+// Shares are of all points; a map of several worlds is written of the main one.
+Json dense_json(const DenseMap& dense) {
+  auto points = count_by_provenance(dense.surface);
+  const auto all = static_cast<double>(std::max<std::size_t>(dense.surface.points.size(), 1));
+  const auto share = [&](Provenance provenance) {
+    return rounded(static_cast<double>(points[provenance]) / all, 4);
+  };
+  return {{"points", dense.surface.points.size()},
+          {"triangles", dense.surface.triangles.size()},
+          {"measured_share", share(Provenance::kMeasured)},
+          {"reprojected_share", share(Provenance::kReprojected)},
+          {"invented_share", share(Provenance::kInvented)},
+          {"voxel_size_metres", dense.voxel_size},
+          {"times_coarsened", dense.times_coarsened},
+          {"keyframes", dense.keyframes},
+          {"dropped", dense.dropped},
+          {"fused_anew", dense.moved},
+          {"voxel_megabytes", rounded(static_cast<double>(dense.voxel_bytes) / 1048576.0, 1)},
+          {"view_megabytes", rounded(static_cast<double>(dense.view_bytes) / 1048576.0, 1)},
+          {"faults", counts_json(dense.faults)}};
+}
+
 Json loops_json(const Slam& slam) {
   Json json{{"closed", Json::array()}, {"refused", slam.refused_loops()}};
   for (const auto& loop : slam.loops()) {
@@ -159,6 +181,7 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   if (slam.restores())
     json["restoration"] = {{"dropped", slam.unrestored()},
                            {"faults", counts_json(slam.restoration_faults())}};
+  if (summary.dense) json["dense"] = dense_json(*summary.dense);
   json["loops"] = loops_json(slam);
   json["map"] = map_json(slam, description);
   json["keyframes"] = slam.map().keyframe_count();

@@ -152,7 +152,7 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
     tracker_.promoted(keyframe);
     tracked.reference = keyframe;
   }
-  record(tracked);
+  record(tracked, frame.index);
   follow_world(tracked);
   if (tracked.reference.is_valid()) result.world = map_.world_of(tracked.reference);
   last_T_camera_world_ = tracked.T_camera_world ? tracked.T_camera_world : last_T_camera_world_;
@@ -162,7 +162,7 @@ std::optional<FrameResult> Slam::process(const Frame& frame, const cv::Mat& mask
   const double seconds = watch.seconds();
   note_times(removal_seconds, extract_seconds, seconds);
   if (keyframe.is_valid()) mapping_.submit(keyframe);
-  if (keyframe.is_valid() && restoration_) restoration_->submit(keyframe, frame, result.removal);
+  if (keyframe.is_valid()) hand_out(keyframe, frame, result.removal);
 
   result.index = frame.index;
   result.timestamp = frame.timestamp;
@@ -214,7 +214,12 @@ Removal Slam::find_movables(const Frame& frame, const cv::Mat& grey) {
   }
   const auto every = static_cast<std::size_t>(options_.removal.label_every);
   if (mode_ == Mode::kRealTime || frames() % every == 0) segmentation_.offer(frame.index, frame.colour);
-  return removal_.find(frame, grey, predicted, segmentation_.take());
+  const auto labels = segmentation_.take();
+  if (labels && labels->segmentation.labels.size() == frame.colour.size()) {
+    labelled_index_ = labels->index;
+    labels_ = labels->segmentation.labels;
+  }
+  return removal_.find(frame, grey, predicted, labels);
 }
 
 std::shared_ptr<const ObservedFrame> Slam::extract(const Frame& frame, const cv::Mat& grey,
@@ -269,9 +274,9 @@ int Slam::count_hidden(const TrackedFrame& frame, const cv::Mat& mask) const {
   return hidden;
 }
 
-void Slam::record(const TrackedFrame& frame) {
+void Slam::record(const TrackedFrame& frame, std::size_t index) {
   ++frames_by_state_[frame.state];
-  Record record{frame.timestamp, {}, {}};
+  Record record{index, frame.timestamp, {}, {}};
   if (frame.T_camera_world && frame.reference.is_valid()) {
     record.reference = frame.reference;
     record.T_camera_reference = *frame.T_camera_world * map_.T_camera_world(frame.reference).inverse();
@@ -303,6 +308,7 @@ void Slam::finish() {
   drain(mapping_);
   drain(closing_);
   if (restoration_) drain(*restoration_);
+  if (dense_) drain(*dense_);
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -16,6 +16,7 @@
 #include "roslam/map/map.hpp"
 #include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/local_mapper.hpp"
+#include "roslam/pipeline/dense_worker.hpp"
 #include "roslam/pipeline/keyframe_worker.hpp"
 #include "roslam/pipeline/options.hpp"
 #include "roslam/pipeline/restoration_worker.hpp"
@@ -57,9 +58,15 @@ class Slam {
   /// Throws InputError if the map was made with another camera or other pyramid levels.
   void continue_from(SavedMap saved);
 
+  /// Fuses keyframes into a dense map from now on, in real-time mode on another thread: restored, if
+  /// restore_keyframes is called as well. Call before the first frame.
+  void map_densely();
+
   /// Restores each keyframe from now on and hands it out, in real-time mode on another thread. inpainter:
-  /// paints what nobody saw, null: a classic method does. Call before the first frame.
-  void restore_keyframes(std::shared_ptr<Inpainter> inpainter, RestorationWorker::OnRestored on_restored);
+  /// paints what nobody saw, null: a classic method does. on_restored may be empty. Call before the first
+  /// frame.
+  void restore_keyframes(std::shared_ptr<Inpainter> inpainter,
+                         RestorationWorker::OnRestored on_restored = {});
 
   /// Keyframes that there was no time to restore, and what went wrong with others, in words.
   bool restores() const { return restoration_.has_value(); }
@@ -75,7 +82,7 @@ class Slam {
   /// Throws OptionsError if there is no map and keyframes.enabled is false.
   std::optional<FrameResult> process(const Frame& frame, const cv::Mat& mask = {});
 
-  /// Waits for mapping and loop closing. Call before reading results.
+  /// Waits for mapping, loop closing and all that goes on beside. Call before reading results.
   void finish();
 
   /// Of several worlds that never met, that of the map the flight went on from, if the flight was in it; else
@@ -97,6 +104,9 @@ class Slam {
 
   /// The map. In real-time mode only after finish().
   const Map& map() const { return map_; }
+
+  /// The dense map of the main world; nothing if none is made. Only after finish().
+  std::optional<DenseMap> dense_map() const;
 
   /// Loops that were closed so far, and how many were refused. In real-time mode only after finish().
   std::vector<ClosedLoop> loops() const;
@@ -120,6 +130,7 @@ class Slam {
  private:
   // The pose of a frame hangs on a keyframe, so that corrections of the map move it too.
   struct Record {
+    std::size_t index;  // of the frame in its source
     double timestamp;
     KeyframeId reference;  // none: not tracked
     SE3 T_camera_reference;
@@ -128,7 +139,9 @@ class Slam {
   void map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   void close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   std::vector<KeyframeId> similar_keyframes(const ObservedFrame& view) const;
-  std::vector<RestorationWorker::Placed> places_of(const std::vector<KeyframeId>& keyframes);
+  std::vector<KeyframePlace> places_of(const std::vector<KeyframeId>& keyframes);
+  void hand_out(KeyframeId keyframe, const Frame& frame, const Removal& removal);
+  std::optional<SE3> labelled_from(KeyframeId keyframe);
   void follow_correction();
   void follow_world(const TrackedFrame& frame);
   std::map<WorldId, std::size_t> frames_by_world() const;
@@ -139,7 +152,7 @@ class Slam {
                                                FrameResult& result);
   void cull_contradicted(const TrackedFrame& frame, const Frame& images, const Removal& removal);
   int count_hidden(const TrackedFrame& frame, const cv::Mat& mask) const;
-  void record(const TrackedFrame& frame);
+  void record(const TrackedFrame& frame, std::size_t index);
   void note_times(double removal, double extract, double total);
   bool removes() const;
 
@@ -166,7 +179,11 @@ class Slam {
   std::optional<SE3> last_T_camera_world_;
   std::size_t followed_corrections_ = 0;
   KeyframeId last_reference_;  // of the last frame that was tracked
+  // For the dense map.
+  std::size_t labelled_index_ = 0;  // of the frame that the newest labels are of
+  cv::Mat labels_;                  // CV_8UC1, empty: none so far
   // Last, so that their threads stop before what they use goes away.
+  std::optional<DenseWorker> dense_;
   std::optional<RestorationWorker> restoration_;
   KeyframeWorker closing_;
   KeyframeWorker mapping_;

@@ -6,19 +6,9 @@
 
 namespace roslam {
 
-void Slam::restore_keyframes(std::shared_ptr<Inpainter> inpainter,
-                             RestorationWorker::OnRestored on_restored) {
-  restoration_.emplace(
-      camera_, options_, mode_, std::move(inpainter),
-      [this](const auto& keyframes) { return places_of(keyframes); }, std::move(on_restored));
-}
-
-std::vector<RestorationWorker::Placed> Slam::places_of(const std::vector<KeyframeId>& keyframes) {
-  const std::scoped_lock lock(map_mutex_);
-  std::vector<RestorationWorker::Placed> places;
-  for (const KeyframeId id : keyframes)
-    places.push_back({map_.world_of(id), map_.T_camera_world(id).inverse()});
-  return places;
+std::optional<DenseMap> Slam::dense_map() const {
+  if (!dense_) return std::nullopt;
+  return dense_->result(main_world());
 }
 
 SavedMap Slam::snapshot() const { return SavedMap::of(camera_, map_, places_ ? &*places_ : nullptr); }
@@ -101,6 +91,7 @@ StageTimes Slam::times() const {
   all.add_all(closing_.times());
   all.add_all(segmentation_.times());
   if (restoration_) all.add_all(restoration_->times());
+  if (dense_) all.add_all(dense_->times());
   return all;
 }
 

@@ -29,6 +29,13 @@ bool is_removable(const MovableObject& object, bool is_sure, const ObjectEvidenc
 }
 }  // namespace
 
+cv::Mat removed_area(const Removal& removal, const cv::Size& picture, int margin) {
+  if (removal.objects.empty()) return {};
+  cv::Mat mask = cv::Mat::zeros(picture, CV_8UC1);
+  for (const MovableObject& object : removal.objects) paint(object, mask);
+  return dilated(mask, margin);
+}
+
 DynamicRemoval::DynamicRemoval(const Camera& camera, const Settings& settings)
     : camera_(camera),
       settings_(settings),

@@ -37,6 +37,10 @@ struct Removal {
   std::optional<SE3> T_camera_world;   ///< where the flow says the camera is, better than a prediction
 };
 
+/// Where the things that were removed hide the scene, and so many pixels around (CV_8UC1, nonzero there):
+/// their outlines are blurred. Empty if nothing was removed.
+cv::Mat removed_area(const Removal& removal, const cv::Size& picture, int margin);
+
 /// Finds what moves in each frame, before its points are extracted: joins the newest labels, carried to the
 /// frame, with what geometry finds, fits the masks to depth and lets them grow over the things they belong
 /// to.

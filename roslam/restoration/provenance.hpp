@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <opencv2/core.hpp>
 
 namespace roslam {
 
@@ -12,5 +13,11 @@ enum class Provenance : std::uint8_t {
   kReprojected = 128,  ///< the camera saw it at another time
   kInvented = 255      ///< nobody saw it
 };
+
+/// In pictures of where things come from (BGR): measured grey, reprojected green, invented magenta.
+inline cv::Vec3b provenance_colour(Provenance provenance) {
+  if (provenance == Provenance::kMeasured) return {200, 200, 200};
+  return provenance == Provenance::kReprojected ? cv::Vec3b(80, 200, 70) : cv::Vec3b(210, 50, 220);
+}
 
 }  // namespace roslam

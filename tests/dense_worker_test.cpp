@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The dense map of a flight: beside the tracker, never in its way.
+#include "roslam/pipeline/dense_worker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <mutex>
+
+#include "roslam/error.hpp"
+#include "tests/restoration_scene.hpp"
+
+namespace roslam::scene {
+namespace {
+
+constexpr float kWallDepth = 3.0F;  // metres, of the whole picture
+constexpr WorldId kHere{0};
+
+class Dense : public testing::Test {
+ protected:
+  void start(Mode mode, DenseOptions dense = {}) {
+    dense.voxel_size = 0.05;
+    dense.follow_every = 1000;
+    Options options;
+    options.dense = dense;
+    worker_.emplace(stage_.camera(), options, mode, [this](const std::vector<KeyframeId>& ids) {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [&] { return !is_held_; });
+      if (fails_) throw ModelError("where that is nobody knows");
+      std::vector<KeyframePlace> places;
+      for (const KeyframeId id : ids)
+        places.push_back({kHere, shift_ * SE3(Eigen::Quaterniond::Identity(), {0.05 * id.value, 0.0, 0.0})});
+      return places;
+    });
+  }
+
+  // A wall, before which something stands in the middle of the picture.
+  DenseKeyframe keyframe(bool with_thing, bool is_restored = false) const {
+    const Camera& camera = stage_.camera();
+    DenseKeyframe result;
+    result.is_restored = is_restored;
+    Frame& frame = result.frame;
+    frame.colour = cv::Mat(camera.height, camera.width, CV_8UC3, cv::Scalar(50, 100, 150));
+    frame.depth = cv::Mat(frame.colour.size(), CV_32FC1, cv::Scalar(kWallDepth));
+    if (!with_thing) return result;
+    const cv::Rect middle(camera.width / 3, camera.height / 3, camera.width / 3, camera.height / 3);
+    cv::Mat mask = cv::Mat::zeros(frame.colour.size(), CV_8UC1);
+    mask(middle).setTo(255);
+    frame.depth.setTo(1.5F, mask);
+    frame.colour.setTo(cv::Scalar(0, 0, 255), mask);
+    MovableObject object;
+    EXPECT_TRUE(take_mask(object, mask));
+    result.removal.objects = {object};
+    return result;
+  }
+
+  DenseMap result() {
+    worker_->drain();
+    return worker_->result(kHere);
+  }
+
+  // Points close to the optical axis of the first keyframe, where the thing stands.
+  static std::size_t in_the_middle(const Surface& surface) {
+    return static_cast<std::size_t>(
+        std::count_if(surface.points.begin(), surface.points.end(),
+                      [](const auto& p) { return p.position.template head<2>().norm() < 0.2F; }));
+  }
+
+  Stage stage_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool is_held_ = false, fails_ = false;
+  SE3 shift_;  // of all keyframes, as a correction of the map makes it
+  std::optional<DenseWorker> worker_;
+};
+
+TEST_F(Dense, MapsWhatIsStaticAndKeepsWhatWasRemovedApart) {
+  start(Mode::kDeterministic);
+  worker_->submit(KeyframeId{0}, keyframe(true));
+  const DenseMap map = result();
+  EXPECT_EQ(map.keyframes, 1U);
+  ASSERT_GT(map.surface.points.size(), 200U);
+  for (const SurfacePoint& point : map.surface.points) EXPECT_NEAR(point.position.z(), kWallDepth, 0.02F);
+  EXPECT_EQ(in_the_middle(map.surface), 0U);
+  ASSERT_GT(map.removed.size(), 20U);
+  for (const SurfacePoint& point : map.removed) {
+    EXPECT_NEAR(point.position.z(), point.colour == cv::Vec3b(0, 0, 255) ? 1.5F : kWallDepth, 1e-4F);
+  }
+}
+
+TEST_F(Dense, FusesPicturesAsTakenIfToldTo) {
+  DenseOptions options;
+  options.remove = false;
+  start(Mode::kDeterministic, options);
+  worker_->submit(KeyframeId{0}, keyframe(true));
+  const DenseMap map = result();
+  EXPECT_GT(in_the_middle(map.surface), 20U);
+  EXPECT_TRUE(map.removed.empty());
+}
+
+TEST_F(Dense, WaitsForAKeyframeToBeRestored) {
+  start(Mode::kDeterministic);
+  worker_->submit(KeyframeId{0}, keyframe(true, true));
+  EXPECT_EQ(result().keyframes, 0U);
+  const DenseKeyframe empty = keyframe(false);
+  RestoredView view{empty.frame.colour,
+                    empty.frame.depth,
+                    cv::Mat(empty.frame.colour.size(), CV_8UC1, cv::Scalar(255)),
+                    {},
+                    {}};
+  worker_->restored(KeyframeId{0}, &view);
+  const DenseMap map = result();
+  EXPECT_GT(in_the_middle(map.surface), 20U);
+  for (const SurfacePoint& point : map.surface.points) EXPECT_EQ(point.provenance, Provenance::kInvented);
+  EXPECT_GT(map.removed.size(), 20U);
+}
+
+TEST_F(Dense, TakesAKeyframeThatCouldNotBeRestoredWithItsHoles) {
+  start(Mode::kDeterministic);
+  worker_->submit(KeyframeId{0}, keyframe(true, true));
+  worker_->restored(KeyframeId{0}, nullptr);
+  worker_->restored(KeyframeId{0}, nullptr);  // said twice
+  const DenseMap map = result();
+  EXPECT_EQ(map.keyframes, 1U);
+  EXPECT_GT(map.surface.points.size(), 200U);
+  EXPECT_EQ(in_the_middle(map.surface), 0U);
+}
+
+TEST_F(Dense, IsInTheEndWhereTheKeyframesAre) {
+  start(Mode::kDeterministic);
+  worker_->submit(KeyframeId{0}, keyframe(false));
+  shift_ = SE3(Eigen::Quaterniond::Identity(), {0.0, 0.0, 100.0});
+  const DenseMap map = result();
+  EXPECT_EQ(map.moved, 1U);
+  ASSERT_GT(map.surface.points.size(), 200U);
+  for (const SurfacePoint& point : map.surface.points)
+    EXPECT_NEAR(point.position.z(), 100.0F + kWallDepth, 0.02F);
+}
+
+TEST_F(Dense, DropsTheOldestRatherThanToMakeAnybodyWait) {
+  DenseOptions options;
+  options.queue = 2;
+  start(Mode::kRealTime, options);
+  {
+    const std::scoped_lock lock(mutex_);
+    is_held_ = true;
+  }
+  for (unsigned id = 0; id < 8; ++id) worker_->submit(KeyframeId{id}, keyframe(false));  // returns at once
+  {
+    const std::scoped_lock lock(mutex_);
+    is_held_ = false;
+    changed_.notify_all();
+  }
+  const DenseMap map = result();
+  EXPECT_GE(map.dropped, 5U);  // one may have been taken up before
+  EXPECT_EQ(map.keyframes + map.dropped, 8U);
+}
+
+TEST_F(Dense, WhatGoesWrongCostsAKeyframeAndNothingElse) {
+  start(Mode::kDeterministic);
+  fails_ = true;
+  worker_->submit(KeyframeId{0}, keyframe(false));
+  fails_ = false;
+  worker_->submit(KeyframeId{1}, keyframe(false));
+  const DenseMap map = result();
+  EXPECT_EQ(map.faults, (std::map<std::string, std::size_t>{{"where that is nobody knows", 1}}));
+  EXPECT_EQ(map.keyframes, 1U);
+}
+
+TEST_F(Dense, IsEmptyWithoutDepth) {
+  start(Mode::kDeterministic);
+  DenseKeyframe input = keyframe(true);
+  input.frame.depth.release();
+  worker_->submit(KeyframeId{0}, input);
+  const DenseMap map = result();
+  EXPECT_EQ(map.keyframes, 0U);
+  EXPECT_TRUE(map.surface.points.empty());
+  EXPECT_TRUE(map.removed.empty());
+  EXPECT_TRUE(map.faults.empty());
+}
+
+TEST_F(Dense, CarriesLabelsFromWhereTheyWereTaken) {
+  start(Mode::kDeterministic);
+  DenseKeyframe input = keyframe(false);
+  const Camera& camera = stage_.camera();
+  // Left half building, right half vegetation, taken half a metre to the right of the keyframe: there the
+  // line between both lies half a metre to the right of the optical axis.
+  input.labels = cv::Mat(camera.height, camera.width, CV_8UC1, cv::Scalar(2));
+  input.labels.colRange(camera.width / 2, camera.width).setTo(8);
+  input.T_labelled_camera = SE3(Eigen::Quaterniond::Identity(), {-0.5, 0.0, 0.0});
+  worker_->submit(KeyframeId{0}, input);
+  const DenseMap map = result();
+  std::size_t labelled = 0;
+  for (const SurfacePoint& point : map.surface.points) {
+    if (point.label == 255) continue;
+    ++labelled;
+    if (std::abs(point.position.x() - 0.5F) < 0.1F) continue;
+    EXPECT_EQ(point.label, point.position.x() < 0.5F ? 2 : 8) << point.position.transpose();
+  }
+  EXPECT_GT(labelled, 200U);
+}
+
+}  // namespace
+}  // namespace roslam::scene
