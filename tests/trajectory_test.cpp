@@ -293,5 +293,44 @@ TEST(Alignment, HasNoAnswerForTooFewUnequalOrUnusablePoints) {
   EXPECT_FALSE(align({}, {}, AlignmentModel::kRigid));
 }
 
+// A camera that flies straight ahead and rolls: positions alone leave the turn about the path open.
+TEST(PoseAlignment, RecoversAMotionFromAStraightPathAndFromOnePose) {
+  Vector6d tangent;
+  tangent << 1.0, -2.0, 0.5, 2.0, -1.0, 1.5;
+  const SE3 motion = SE3::exp(tangent);
+  std::vector<SE3> source, target;
+  for (int i = 0; i < 10; ++i) {
+    source.emplace_back(so3_exp({0.0, 0.0, 0.3 * i}), Eigen::Vector3d(0.0, 0.0, 0.2 * i));
+    target.push_back(motion * source.back());
+  }
+  // The same rotation written the other way.
+  target[4] = SE3::from_parts(Eigen::Quaterniond(-target[4].rotation().coeffs()), target[4].translation());
+  const auto found = align_poses(source, target);
+  ASSERT_TRUE(found);
+  EXPECT_LT((found->inverse() * motion).log().norm(), 1e-9);
+  const auto from_one = align_poses({source[3]}, {target[3]});
+  ASSERT_TRUE(from_one);
+  EXPECT_LT((from_one->inverse() * motion).log().norm(), 1e-9);
+}
+
+TEST(PoseAlignment, ErrorsThatCancelOutCostNothing) {
+  std::vector<SE3> source, target;
+  for (const double error : {0.1, -0.1}) {
+    source.emplace_back(so3_exp({error, 0.0, 0.0}), Eigen::Vector3d(2.0 * error, 0.0, 0.0));
+    target.emplace_back();
+  }
+  const auto found = align_poses(source, target);
+  ASSERT_TRUE(found);
+  EXPECT_LT(found->log().norm(), 1e-12);
+}
+
+TEST(PoseAlignment, HasNoAnswerForNoneUnequalOrUnusablePoses) {
+  const SE3 unusable(Eigen::Quaterniond::Identity(),
+                     Eigen::Vector3d(std::numeric_limits<double>::infinity(), 0, 0));
+  EXPECT_FALSE(align_poses({}, {}));
+  EXPECT_FALSE(align_poses({SE3()}, {}));
+  EXPECT_FALSE(align_poses({SE3(), unusable}, {SE3(), SE3()}));
+}
+
 }  // namespace
 }  // namespace roslam

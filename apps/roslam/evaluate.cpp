@@ -12,6 +12,7 @@ void add_evaluate_command(CLI::App& program) {
   add_evaluate_segmentation_command(*evaluate);
   add_evaluate_removal_command(*evaluate);
   add_evaluate_restoration_command(*evaluate);
+  add_evaluate_map_command(*evaluate);
 }
 
 }  // namespace roslam::app

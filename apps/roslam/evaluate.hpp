@@ -10,5 +10,6 @@ void add_evaluate_trajectory_command(CLI::App& evaluate);
 void add_evaluate_segmentation_command(CLI::App& evaluate);
 void add_evaluate_removal_command(CLI::App& evaluate);
 void add_evaluate_restoration_command(CLI::App& evaluate);
+void add_evaluate_map_command(CLI::App& evaluate);
 
 }  // namespace roslam::app

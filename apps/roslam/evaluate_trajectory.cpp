@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/roslam/evaluate.hpp"
+#include "apps/roslam/named_path.hpp"
 #include "apps/roslam/output.hpp"
 #include "roslam/error.hpp"
 #include "roslam/evaluation/trajectory_error.hpp"
@@ -57,47 +58,10 @@ fs::path file_in(const fs::path& path, const std::vector<std::string>& names) {
   throw InputError(path.string() + ": the folder holds no " + wanted + "; name the trajectory file itself");
 }
 
-// A run of this program is told by its folder, a file by its own name.
-std::string short_name(const fs::path& given) {
-  const fs::path path = fs::absolute(given).lexically_normal();
-  const fs::path whole = path.has_filename() ? path : path.parent_path();
-  if (fs::is_directory(given)) return whole.filename().string();
-  return whole.filename() == "trajectory.txt" ? whole.parent_path().filename().string()
-                                              : whole.stem().string();
-}
-
-struct Named {
-  std::string name;
-  fs::path file;
-};
-
-// FILE or NAME=FILE; a file whose own name holds an equals sign goes before.
-Named parse_named(const std::string& argument) {
-  const auto equals = argument.find('=');
-  if (equals == std::string::npos || equals == 0 || fs::exists(argument)) {
-    return {short_name(argument), file_in(argument, {"trajectory.txt"})};
-  }
-  return {argument.substr(0, equals), file_in(argument.substr(equals + 1), {"trajectory.txt"})};
-}
-
-std::vector<Named> parse_all(const std::vector<std::string>& arguments) {
-  std::vector<Named> all;
-  all.reserve(arguments.size());
-  for (const auto& argument : arguments) all.push_back(parse_named(argument));
+std::vector<NamedPath> parse_all(const std::vector<std::string>& arguments) {
+  std::vector<NamedPath> all = parse_named(arguments);
+  for (auto& named : all) named.path = file_in(named.path, {"trajectory.txt"});
   return all;
-}
-
-// Rows that share a name could not be told apart: they are called by their paths.
-void make_names_differ(std::vector<Named>& estimates, std::vector<Named>& others) {
-  std::map<std::string, int> count;
-  for (const auto* list : {&estimates, &others}) {
-    for (const auto& named : *list) ++count[named.name];
-  }
-  for (auto* list : {&estimates, &others}) {
-    for (auto& named : *list) {
-      if (count[named.name] > 1) named.name = named.file.string();
-    }
-  }
 }
 
 TrajectoryFile read_and_note(const fs::path& file) {
@@ -109,7 +73,7 @@ TrajectoryFile read_and_note(const fs::path& file) {
   return read;
 }
 
-std::vector<EvaluatedTrajectory> evaluate_all(const Trajectory& truth, const std::vector<Named>& files,
+std::vector<EvaluatedTrajectory> evaluate_all(const Trajectory& truth, const std::vector<NamedPath>& files,
                                               const TrajectoryErrorOptions& options) {
   std::vector<EvaluatedTrajectory> all;
   for (const auto& [name, file] : files) {
@@ -141,7 +105,7 @@ void run(const Arguments& arguments) {
   report.truth_file = truth_file.string();
   auto estimates = parse_all(arguments.estimates);
   auto others = parse_all(arguments.others);
-  make_names_differ(estimates, others);
+  make_names_differ({&estimates, &others});
   report.runs = evaluate_all(truth, estimates, report.options);
   report.others = evaluate_all(truth, others, report.options);
   // The figure first: if it cannot be written, there is no half of a result on stdout.

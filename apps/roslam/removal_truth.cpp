@@ -44,13 +44,6 @@ class FlightTruth : public RemovalTruth {
   std::size_t index_ = 0;
 };
 
-// What a folder of a recording knows.
-struct TruthFolder {
-  fs::path instances;  // empty: there are none
-  fs::path labels;
-  bool labels_are_classes = true;
-};
-
 std::vector<fs::path> images_in(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -77,32 +70,15 @@ bool are_actors(const std::vector<fs::path>& files) {
   return pixels.front() > other + most && (most == 0 || other == 0);
 }
 
-std::optional<TruthFolder> find_truth(const fs::path& folder) {
-  TruthFolder truth;
-  // What roslam segment labelled, which writes labels.json beside, is no truth.
-  const auto labels =
-      fs::exists(folder / "labels/labels.json") ? std::vector<fs::path>{} : images_in(folder / "labels");
-  if (!labels.empty()) truth.labels = folder / "labels";
-  if (!images_in(folder / "instances").empty()) {
-    truth.instances = folder / "instances";
-  } else if (labels.empty()) {
-    return std::nullopt;
-  } else {
-    truth.labels_are_classes = !are_actors(labels);
-  }
-  return truth;
-}
-
 class RecordedTruth : public RemovalTruth {
  public:
-  RecordedTruth(std::unique_ptr<TumSource> source, TruthFolder folder)
+  RecordedTruth(std::unique_ptr<TumSource> source, MovingTruthFolder folder)
       : source_(std::move(source)), folder_(std::move(folder)) {}
 
   std::optional<RemovalTruthFrame> next() override {
     const auto frame = source_->next();
     if (!frame) return std::nullopt;
-    const std::string name = source_->colour_file(frame->index).stem().string() + ".png";
-    std::optional<MovingTruth> truth = read(name);
+    std::optional<MovingTruth> truth = folder_.read(source_->colour_file(frame->index).stem().string());
     if (truth && truth->actors.size() != frame->colour.size()) truth.reset();
     return RemovalTruthFrame{frame->timestamp, frame->colour, truth};
   }
@@ -111,30 +87,45 @@ class RecordedTruth : public RemovalTruth {
   std::map<std::string, std::size_t> skipped() const override { return source_->skipped(); }
 
  private:
-  // What cannot be read or does not fit is nothing.
-  std::optional<MovingTruth> read(const std::string& name) const {
-    cv::Mat labels;
-    if (!folder_.labels.empty()) {
-      labels = read_label_image(folder_.labels / name).image;
-      if (labels.empty()) return std::nullopt;
-    }
-    if (!folder_.instances.empty()) {
-      const cv::Mat instances = read_depth_image(folder_.instances / name).image;
-      if (instances.empty() || (!labels.empty() && labels.size() != instances.size())) return std::nullopt;
-      return truth_of(instances, labels);
-    }
-    return MovingTruth{folder_.labels_are_classes ? movable_mask(labels) : cv::Mat(labels != 0), {}};
-  }
-
   std::unique_ptr<TumSource> source_;
-  TruthFolder folder_;
+  MovingTruthFolder folder_;
 };
 }  // namespace
+
+std::optional<MovingTruthFolder> MovingTruthFolder::open(const fs::path& folder) {
+  MovingTruthFolder truth;
+  // What roslam segment labelled, which writes labels.json beside, is no truth.
+  const auto labels =
+      fs::exists(folder / "labels/labels.json") ? std::vector<fs::path>{} : images_in(folder / "labels");
+  if (!labels.empty()) truth.labels_ = folder / "labels";
+  if (!images_in(folder / "instances").empty()) {
+    truth.instances_ = folder / "instances";
+  } else if (labels.empty()) {
+    return std::nullopt;
+  } else {
+    truth.labels_are_classes_ = !are_actors(labels);
+  }
+  return truth;
+}
+
+std::optional<MovingTruth> MovingTruthFolder::read(const std::string& name) const {
+  cv::Mat labels;
+  if (!labels_.empty()) {
+    labels = read_label_image(labels_ / (name + ".png")).image;
+    if (labels.empty()) return std::nullopt;
+  }
+  if (!instances_.empty()) {
+    const cv::Mat instances = read_depth_image(instances_ / (name + ".png")).image;
+    if (instances.empty() || (!labels.empty() && labels.size() != instances.size())) return std::nullopt;
+    return truth_of(instances, labels);
+  }
+  return MovingTruth{labels_are_classes_ ? movable_mask(labels) : cv::Mat(labels != 0), {}};
+}
 
 std::unique_ptr<RemovalTruth> open_removal_truth(const SourceArguments& arguments) {
   if (const auto flight = simulated_flight(arguments)) return std::make_unique<FlightTruth>(*flight);
   auto recording = open_recording(arguments);
-  const auto folder = find_truth(arguments.name);
+  const auto folder = MovingTruthFolder::open(arguments.name);
   if (!folder) return nullptr;
   return std::make_unique<RecordedTruth>(std::move(recording), *folder);
 }

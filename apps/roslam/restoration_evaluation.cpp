@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/restoration_evaluation.hpp"
 
-#include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "apps/roslam/progress.hpp"
 #include "apps/roslam/restoration_pictures.hpp"
 #include "roslam/error.hpp"
-#include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/semantics/label_set.hpp"
 #include "roslam/sources/image_file.hpp"
@@ -41,19 +38,6 @@ fs::path folder_of_masks(const RestorationEvaluationSettings& settings) {
   std::error_code error;
   return fs::is_directory(settings.masks / "provenance", error) ? settings.masks / "provenance"
                                                                 : settings.masks;
-}
-
-std::optional<double> depth_units_beside(const fs::path& folder) {
-  std::error_code error;
-  // What people were composed into has units of its own.
-  if (fs::exists(folder / "background.txt", error)) {
-    const auto json = nlohmann::json::parse(std::ifstream(folder / "composition.json"), nullptr, false);
-    const char* key = "background_depth_units_per_metre";
-    if (!json.is_object() || !json.contains(key) || !json[key].is_number()) return std::nullopt;
-    return json[key].get<double>();
-  }
-  if (!fs::is_regular_file(folder / "camera.yaml", error)) return std::nullopt;
-  return read_camera(folder / "camera.yaml").depth_units_per_metre;
 }
 
 // Depth that cannot be read, or whose units nobody knows, is not compared.

@@ -2,7 +2,10 @@
 #include "apps/roslam/restoration_pictures.hpp"
 
 #include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
 
+#include "roslam/geometry/camera.hpp"
 #include "roslam/sources/picture_source.hpp"
 #include "roslam/sources/tum_source.hpp"
 
@@ -14,6 +17,11 @@ namespace fs = std::filesystem;
 bool is_file(const fs::path& file) {
   std::error_code error;
   return fs::is_regular_file(file, error);
+}
+
+bool has_background_folder(const fs::path& folder) {
+  std::error_code error;
+  return is_file(folder / "rgb.txt") && fs::is_directory(folder / "background" / "rgb", error);
 }
 
 std::vector<TimedFile> sorted_list(const fs::path& file) {
@@ -47,13 +55,28 @@ std::vector<SequencePicture> pictures_of(const fs::path& folder) {
   return pictures;
 }
 
+bool knows_background(const fs::path& folder) {
+  return is_file(folder / "background.txt") || has_background_folder(folder);
+}
+
 std::vector<SequencePicture> background_of(const fs::path& folder) {
   if (is_file(folder / "background.txt"))
     return listed(folder, folder / "background.txt", folder / "background_depth.txt");
-  std::error_code error;
-  if (is_file(folder / "rgb.txt") && fs::is_directory(folder / "background" / "rgb", error))
+  if (has_background_folder(folder))
     return listed(folder / "background", folder / "rgb.txt", folder / "depth.txt");
   return pictures_of(folder);
+}
+
+std::optional<double> depth_units_beside(const fs::path& folder) {
+  // What people were composed into has units of its own.
+  if (is_file(folder / "background.txt")) {
+    const auto json = nlohmann::json::parse(std::ifstream(folder / "composition.json"), nullptr, false);
+    const char* key = "background_depth_units_per_metre";
+    if (!json.is_object() || !json.contains(key) || !json[key].is_number()) return std::nullopt;
+    return json[key].get<double>();
+  }
+  if (!is_file(folder / "camera.yaml")) return std::nullopt;
+  return read_camera(folder / "camera.yaml").depth_units_per_metre;
 }
 
 }  // namespace roslam::app

@@ -24,4 +24,11 @@ std::vector<SequencePicture> pictures_of(const std::filesystem::path& folder);
 /// from its background/ (roslam simulate); else the pictures of the folder.
 std::vector<SequencePicture> background_of(const std::filesystem::path& folder);
 
+/// Whether the folder knows that: background_of then gives other pictures than pictures_of.
+bool knows_background(const std::filesystem::path& folder);
+
+/// Value of the depth images of background_of(folder) at one metre, as composition.json (roslam compose) or
+/// camera.yaml beside them says; nothing if neither does. Throws as read_camera does.
+std::optional<double> depth_units_beside(const std::filesystem::path& folder);
+
 }  // namespace roslam::app

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/geometry/alignment.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <cmath>
@@ -53,6 +54,23 @@ std::optional<Alignment> align(const std::vector<Eigen::Vector3d>& source,
   alignment.unique_rotation = !coincide(from, from_centred) && !coincide(to, to_centred) &&
                               singular[1] > kRelativeRounding * singular[0];
   return alignment;
+}
+
+std::optional<SE3> align_poses(const std::vector<SE3>& source, const std::vector<SE3>& target) {
+  if (source.empty() || source.size() != target.size()) return std::nullopt;
+  // The outer product, as a quaternion and its negative are one rotation.
+  Eigen::Matrix4d products = Eigen::Matrix4d::Zero();
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    if (!source[i].is_finite() || !target[i].is_finite()) return std::nullopt;
+    const Eigen::Vector4d turn = (target[i].rotation() * source[i].rotation().conjugate()).coeffs();
+    products += turn * turn.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(products);
+  const Eigen::Quaterniond rotation(Eigen::Vector4d(solver.eigenvectors().col(3)));  // of the largest value
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < source.size(); ++i)
+    translation += target[i].translation() - rotation * source[i].translation();
+  return SE3(rotation, translation / static_cast<double>(source.size()));
 }
 
 }  // namespace roslam

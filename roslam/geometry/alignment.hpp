@@ -33,4 +33,11 @@ enum class AlignmentModel {
 std::optional<Alignment> align(const std::vector<Eigen::Vector3d>& source,
                                const std::vector<Eigen::Vector3d>& target, AlignmentModel model);
 
+/// The motion T_target_source that takes poses of a body in one world to the poses of the same index in
+/// another: its rotation is the mean of target times inverse source (Markley, Cheng, Crassidis, Oshman:
+/// "Averaging Quaternions", JGCD 2007), its translation the mean of what is left. Unlike align it is unique
+/// on a straight path and at rest too, but trusts that no pose is turned by much. None for no poses, counts
+/// that differ, and values that are not finite.
+std::optional<SE3> align_poses(const std::vector<SE3>& source, const std::vector<SE3>& target);
+
 }  // namespace roslam

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/map_evaluation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "apps/roslam/progress.hpp"
+#include "roslam/cloud/surface_file.hpp"
+#include "roslam/error.hpp"
+#include "roslam/evaluation/association.hpp"
+#include "roslam/evaluation/markdown_table.hpp"
+#include "roslam/geometry/alignment.hpp"
+
+namespace roslam::app {
+
+namespace {
+namespace fs = std::filesystem;
+
+// A run's map, not read yet, and where it belongs.
+struct PlacedMap {
+  fs::path file;
+  SE3 T_truth_world;
+  double rmse = 0.0;  // metres
+};
+
+// Also tells what is missing, before the truth is gathered, which takes long.
+PlacedMap place(const fs::path& run, const Trajectory& truth) {
+  PlacedMap map{run / "dense.ply", {}, 0.0};
+  std::error_code error;
+  if (!fs::is_regular_file(map.file, error))
+    throw InputError(map.file.string() + ": is missing; repeat the run without --no-dense");
+  const fs::path file = run / "trajectory.txt";
+  AssociationOptions association;
+  association.interpolate = true;
+  const auto pairs = associate(truth, read_trajectory(file).trajectory, association);
+  std::vector<SE3> estimated, true_poses;
+  for (const auto& pair : pairs) {
+    estimated.push_back(pair.estimate.T_world_camera);
+    true_poses.push_back(pair.truth.T_world_camera);
+  }
+  const auto T_truth_world = align_poses(estimated, true_poses);
+  if (!T_truth_world) {
+    throw InputError(
+        file.string() +
+        ": has no pose at a time of the truth; is it a run of the same sequence, by the same clock?");
+  }
+  map.T_truth_world = *T_truth_world;
+  double squares = 0.0;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    squares += (*T_truth_world * estimated[i].translation() - true_poses[i].translation()).squaredNorm();
+  map.rmse = std::sqrt(squares / static_cast<double>(pairs.size()));
+  return map;
+}
+
+Surface read_placed(const PlacedMap& map) { return moved(read_surface_ply(map.file), map.T_truth_world); }
+
+MapTruth gather(const MapEvaluationSettings& settings, const MapSequence& sequence) {
+  MapTruth truth(sequence.camera(), settings.truth_options);
+  Progress progress(sequence.size(), settings.quiet);
+  for (std::size_t i = 0; i < sequence.size(); i += settings.every) {
+    try {
+      if (const auto frame = sequence.frame(i)) truth.add(*frame);
+    } catch (const InputError& error) {
+      throw InputError(settings.truth.sequence.string() + ": " + error.what());
+    }
+    progress.show(i + 1, "truth gathered");
+  }
+  const auto& points = truth.static_points();
+  if (std::none_of(points.begin(), points.end(), [&](const auto& point) { return truth.is_near(point); })) {
+    throw InputError(settings.truth.sequence.string() + ": the depth of its background is nowhere within " +
+                     fixed(settings.truth_options.range, 1) +
+                     " m of a known pose; check groundtruth.txt and the units of depth, or raise --range");
+  }
+  return truth;
+}
+}  // namespace
+
+std::vector<EvaluatedMap> evaluate_maps(const MapEvaluationSettings& settings) {
+  const MapSequence sequence(settings.truth);
+  std::vector<PlacedMap> placed;
+  for (const auto& run : settings.estimates) placed.push_back(place(run.path, sequence.trajectory()));
+  std::optional<PlacedMap> reference;
+  if (!settings.reference.empty()) reference = place(settings.reference, sequence.trajectory());
+  MapComparison comparison(gather(settings, sequence), settings.error_options);
+  if (reference) comparison.set_reference(read_placed(*reference));
+  std::vector<EvaluatedMap> maps;
+  for (std::size_t i = 0; i < placed.size(); ++i)
+    maps.push_back({settings.estimates[i].name, placed[i].rmse, comparison.error(read_placed(placed[i]))});
+  return maps;
+}
+
+}  // namespace roslam::app
