@@ -85,7 +85,7 @@ void export_dense(const fs::path& map, const DenseExport& what) {
     const Occupancy occupancy = occupancy_of_points(map, surface, what);
     occupancy.write(what.octomap);
     std::array<char, 96> content{};
-    std::snprintf(content.data(), content.size(), "cells of %g m, %.2f m3 occupied and %.2f m3 free",
+    std::snprintf(content.data(), content.size(), "cells of %g m, %.4g m3 occupied and %.4g m3 free",
                   occupancy.resolution(), occupancy.occupied_volume(), occupancy.free_volume());
     say(what.octomap, content.data());
   }

@@ -2,7 +2,6 @@
 #include "roslam/cloud/free_space.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -48,28 +47,38 @@ class Marker {
   CellBlock* block_ = nullptr;
 };
 
+// A line along one axis: in which cell it is, and at which share of it it enters the next. One for each axis,
+// in registers: arrays by axis take twice as long.
+struct Course {
+  Course(double from, double to)
+      : cell(static_cast<int>(std::floor(from))),
+        last(static_cast<int>(std::floor(to))),
+        step(to > from ? 1 : -1),
+        apart(1.0 / std::abs(to - from)),
+        next(cell == last ? kNever : (cell + (to > from ? 1 : 0) - from) / (to - from)) {}
+
+  void advance() {
+    cell += step;
+    next = cell == last ? kNever : next + apart;  // rounding must not lead past the last
+  }
+
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+  int cell, last, step;
+  double apart, next;
+};
+
 // Marks the cells on a line, but for the last (Amanatides and Woo 1987). from, to: in cells.
 void mark_line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, Marker& marker) {
-  constexpr double kNever = std::numeric_limits<double>::infinity();
-  const Eigen::Vector3d way = to - from;
-  Eigen::Vector3i cell = from.array().floor().cast<int>();
-  const Eigen::Vector3i last = to.array().floor().cast<int>();
-  std::array<double, 3> next{}, apart{};  // where the line enters the next cell along each axis, share of it
-  std::array<int, 3> step{};
-  for (int i = 0; i < 3; ++i) {
-    const auto a = static_cast<std::size_t>(i);
-    step[a] = way[i] > 0.0 ? 1 : -1;
-    apart[a] = way[i] != 0.0 ? 1.0 / std::abs(way[i]) : kNever;
-    const double border = static_cast<double>(cell[i]) + (way[i] > 0.0 ? 1.0 : 0.0);
-    next[a] = cell[i] == last[i] ? kNever : (border - from[i]) / way[i];
-  }
-  while (cell != last) {
-    marker.mark(cell);
-    const auto a = static_cast<std::size_t>(std::min_element(next.begin(), next.end()) - next.begin());
-    const auto i = static_cast<Eigen::Index>(a);
-    cell[i] += step[a];
-    // Rounding must not lead past the last cell.
-    next[a] = cell[i] == last[i] ? kNever : next[a] + apart[a];
+  Course x(from.x(), to.x()), y(from.y(), to.y()), z(from.z(), to.z());
+  while (x.cell != x.last || y.cell != y.last || z.cell != z.last) {
+    marker.mark({x.cell, y.cell, z.cell});
+    if (x.next < y.next && x.next < z.next) {
+      x.advance();
+    } else if (y.next < z.next) {
+      y.advance();
+    } else {
+      z.advance();
+    }
   }
 }
 }  // namespace
