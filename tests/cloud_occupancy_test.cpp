@@ -125,6 +125,24 @@ TEST(Occupancy, IsOccupiedWhereAPointIsWhateverComesFirst) {
   EXPECT_NEAR(before.free_volume(), after.free_volume(), 1e-9);
 }
 
+// Rays to what is farther pass through cells of a floor, too.
+TEST(Occupancy, TakesNoCellForFreeThatAReadingLiesIn) {
+  const DenseView view = view_of({1, 1.25}, SE3());
+  Occupancy space(kCell);
+  space.add_view(view, SE3());
+  EXPECT_GT(space.free_volume(), 1.0);
+  int readings = 0;
+  for (int y = 0; y < view.depth.rows; ++y) {
+    for (int x = 0; x < view.depth.cols; ++x) {
+      const double depth = static_cast<double>(view.depth.at<float>(y, x));
+      if (depth == 0.0) continue;
+      ASSERT_EQ(space.at(view.camera.unproject({x, y}, depth)), Space::kUnknown);
+      ++readings;
+    }
+  }
+  EXPECT_GT(readings, 1000);
+}
+
 // A view of one pixel is one ray.
 TEST(Occupancy, FreesTheCellsOfARayAndNoOthers) {
   std::mt19937 random(3);
