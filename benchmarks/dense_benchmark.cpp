@@ -6,6 +6,7 @@
 
 #include "benchmarks/benchmarks.hpp"
 #include "roslam/cloud/dense_mapper.hpp"
+#include "roslam/cloud/occupancy.hpp"
 
 namespace roslam::benchmarks {
 
@@ -47,6 +48,19 @@ void extract(benchmark::State& state, RenderedFlight& flight) {
   }
   state.counters["points"] = static_cast<double>(points);
 }
+
+// Free, occupied and unknown cells of 0.1 m.
+void occupy(benchmark::State& state, RenderedFlight& flight) {
+  const ViewReducer reducer(flight.camera(), {}, {});
+  const DenseMapper mapper = mapped(flight, reducer, std::min(kKeyframes, flight.frames().size()));
+  const Surface surface = mapper.surface(WorldId{0});
+  double free = 0.0;
+  for (auto _ : state) {
+    free = occupancy_of(mapper, WorldId{0}, surface, 0.1).free_volume();
+    benchmark::DoNotOptimize(free);
+  }
+  state.counters["m3_free"] = free;
+}
 }  // namespace
 
 void register_dense_benchmarks(const std::shared_ptr<RenderedFlight>& flight) {
@@ -56,6 +70,9 @@ void register_dense_benchmarks(const std::shared_ptr<RenderedFlight>& flight) {
   })->Unit(benchmark::kMillisecond);
   RegisterBenchmark("dense/surface_of_20_keyframes", [=](auto& state) {
     extract(state, *flight);
+  })->Unit(benchmark::kMillisecond);
+  RegisterBenchmark("dense/occupancy_of_20_keyframes", [=](auto& state) {
+    occupy(state, *flight);
   })->Unit(benchmark::kMillisecond);
 }
 

@@ -4,6 +4,8 @@
 #include <random>
 
 #include "roslam/atlas/map_file.hpp"
+#include "roslam/cloud/occupancy.hpp"
+#include "roslam/cloud/surface_file.hpp"
 #include "roslam/error.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/pipeline/options.hpp"
@@ -46,6 +48,15 @@ SavedMap small_map() {
   saved.words = {{{1, 0.5F}, {7, 0.5F}}, {}};
   return saved;
 }
+
+Surface small_surface() {
+  Surface surface;
+  surface.spacing = 0.05;
+  for (int i = 0; i < 4; ++i)
+    surface.points.push_back({{0.1F * static_cast<float>(i), 0.0F, 1.0F}, {0.0F, 0.0F, 1.0F}, {1, 2, 3}});
+  surface.triangles = {{0, 1, 2}, {1, 3, 2}};
+  return surface;
+}
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -66,6 +77,15 @@ int main(int count, char** arguments) {
     const std::vector<std::vector<Descriptor>> pictures{random_descriptors(60)};
     put("vocabulary", Vocabulary::train(pictures, {.branching = 3, .depth = 3}).content());
     put("map", encode_map(small_map()));
+    put("surface_ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 1e0\n3 0 1 2\n");
+    write_surface_ply(folder / "surface_ply" / "binary", small_surface(), true);
+    Occupancy occupancy(0.1);
+    occupancy.add_surface(small_surface());
+    make_folder(folder / "occupancy");
+    occupancy.write(folder / "occupancy" / "states.bt");
+    occupancy.write(folder / "occupancy" / "probabilities.ot");
   } catch (const Error& error) {
     std::fprintf(stderr, "error: %s\n", error.what());
     return 1;

@@ -94,6 +94,7 @@ TEST_F(SurfaceFile, SaysWhatIsWrongWithAFile) {
                "3\n3 0 0 9\n",
        "corner"},
       {"ply\nformat ascii 1.0\nelement vertex many\nend_header\n", "count"},
+      {begin + "property float z\nelement face 999999999999999\nend_header\n1 2 3\n", "no properties"},
   };
   for (const auto& [content, word] : cases) {
     write_file(folder / "bad.ply", content);

@@ -19,7 +19,8 @@ class Deterministic : public Dataset {
                                           scratch_);
       ASSERT_EQ(outcome.code, 0) << outcome.error;
     }
-    for (const char* file : {"trajectory.txt", "keyframes.txt", "map.ply", "dense.ply", "trajectory.png"}) {
+    for (const char* file :
+         {"trajectory.txt", "keyframes.txt", "map.ply", "dense.ply", "dense.bt", "trajectory.png"}) {
       const std::string bytes = content(scratch_ / "one" / file);
       EXPECT_GT(bytes.size(), 100u) << file;
       EXPECT_TRUE(bytes == content(scratch_ / "two" / file)) << file << " differs";

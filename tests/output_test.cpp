@@ -16,8 +16,8 @@ namespace roslam::street {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr std::array<const char*, 7> kResults{"trajectory.txt", "keyframes.txt", "map.ply",    "run.json",
-                                              "trajectory.png", "dense.ply",     "report.html"};
+constexpr std::array<const char*, 8> kResults{"trajectory.txt", "keyframes.txt", "map.ply",  "run.json",
+                                              "trajectory.png", "dense.ply",     "dense.bt", "report.html"};
 
 class Output : public Dataset {
  protected:

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "apps/roslam/commands.hpp"
+#include "apps/roslam/export_dense.hpp"
 #include "apps/roslam/output.hpp"
 #include "apps/roslam/progress.hpp"
 #include "apps/roslam/sources.hpp"
@@ -182,27 +183,26 @@ void add_merge_command(CLI::App& map) {
 }
 
 struct ExportArguments {
-  fs::path file;
-  fs::path ply;
+  fs::path map;
   fs::path keyframes;
   fs::path camera;
   std::optional<std::uint32_t> flight;
+  DenseExport dense;  // its ply serves both kinds of maps
+
+  bool is_of_flight() const { return !keyframes.empty() || !camera.empty() || flight; }
 };
 
-void export_map(const ExportArguments& arguments) {
-  if (arguments.ply.empty() && arguments.keyframes.empty() && arguments.camera.empty()) {
-    throw CLI::ValidationError("roslam map export", "needs --ply, --keyframes or --camera");
-  }
-  const SavedMap saved = load_map(arguments.file);
+void export_sparse(const fs::path& file, const ExportArguments& arguments) {
+  const SavedMap saved = load_map(file);
   const Map& map = saved.map;
   const WorldId world = main_world(map);
-  if (!arguments.ply.empty()) write_map_ply(arguments.ply, map, world);
+  if (!arguments.dense.ply.empty()) write_map_ply(arguments.dense.ply, map, world);
   if (!arguments.camera.empty()) write_file(arguments.camera, camera_to_yaml(saved.camera));
   if (!arguments.keyframes.empty()) {
     const std::uint32_t flight = arguments.flight.value_or(map.flight());
     const Trajectory trajectory = map.trajectory(flight, world);
     if (trajectory.empty()) {
-      throw InputError(arguments.file.string() + ": no keyframe of flight " + std::to_string(flight) +
+      throw InputError(file.string() + ": no keyframe of flight " + std::to_string(flight) +
                        " in its largest part; choose another --flight, counted from 0 (roslam map info)");
     }
     write_trajectory(arguments.keyframes, trajectory);
@@ -210,15 +210,75 @@ void export_map(const ExportArguments& arguments) {
   require_written_output();
 }
 
+// Of a run folder, the map that has what is asked for.
+fs::path map_file(const ExportArguments& arguments) {
+  if (!fs::is_directory(arguments.map)) return arguments.map;
+  if (arguments.is_of_flight()) return arguments.map / "map.roslam";
+  const fs::path dense = arguments.map / "dense.ply";
+  if (!fs::exists(dense)) {
+    throw InputError(dense.string() +
+                     ": no such file; give the folder of a run with a dense map, or its map.roslam for the "
+                     "landmarks");
+  }
+  return dense;
+}
+
+void export_map(const ExportArguments& arguments) {
+  const auto refuse = [](const char* why) { throw CLI::ValidationError("roslam map export", why); };
+  const DenseExport& dense = arguments.dense;
+  if (!dense.has_file() && arguments.keyframes.empty() && arguments.camera.empty())
+    refuse("needs --ply, --mesh, --pcd, --octomap, --keyframes or --camera");
+  if (dense.resolution && dense.octomap.empty()) refuse("--resolution needs --octomap");
+  const fs::path file = map_file(arguments);
+  if (is_dense_map(file)) {
+    if (arguments.is_of_flight())
+      refuse("--keyframes, --flight and --camera need a map.roslam, not a PLY file");
+    export_dense(file, dense);
+  } else {
+    if (dense.is_of_dense_only()) {
+      refuse(
+          "--mesh, --pcd, --octomap, --resolution and --no-invented need a dense map, and none of "
+          "--keyframes, --flight and --camera");
+    }
+    export_sparse(file, arguments);
+  }
+}
+
+std::string octomap_ending(const std::string& file) {
+  const fs::path ending = fs::path(file).extension();
+  return ending == ".bt" || ending == ".ot" ? "" : file + " has to end in .bt or .ot";
+}
+
+constexpr auto kExportExamples = R"(Examples:
+  roslam map export live/map.roslam --ply landmarks.ply --keyframes keyframes.txt --camera camera.yaml
+  roslam map export live --mesh street.ply --pcd street.pcd
+  roslam map export live/dense.ply --octomap street.bt --resolution 0.1 --no-invented
+
+MAP is a map.roslam, a dense map (PLY), or the folder of a run, whose dense.ply is taken, or its map.roslam where
+--keyframes or --camera is asked for. Of parts of a map.roslam that never met, the largest is written.
+OctoMap files hold cells that are occupied, by the points of the map, and free, as dense.bt beside dense.ply (the PLY's name
+with .bt) tells; without that file only occupied cells are known.
+Exit code: 0 success, 1 an error in the input, 2 wrong usage.)";
+
 void add_export_command(CLI::App& map) {
   const auto arguments = std::make_shared<ExportArguments>();
+  DenseExport& dense = arguments->dense;
   CLI::App* command = map.add_subcommand("export", "Write what a map holds in formats of other programs");
-  command->footer(
-      "Example:\n"
-      "  roslam map export street.roslam --ply street.ply --keyframes keyframes.txt --camera camera.yaml\n"
-      "Of parts that never met, the largest is written.");
-  command->add_option("MAP", arguments->file, "Map that roslam run wrote")->required();
-  command->add_option("--ply", arguments->ply, "Landmarks with colour (binary PLY)");
+  command->footer(kExportExamples);
+  command->add_option("MAP", arguments->map, "Map that roslam run wrote, or the folder of a run")->required();
+  command->add_option("--ply", dense.ply,
+                      "Points with colour (binary PLY): of a dense map with normals, labels and provenance, "
+                      "else landmarks");
+  command->add_option("--mesh", dense.mesh, "The same of a dense map, with triangles (binary PLY)");
+  command->add_option("--pcd", dense.pcd, "Points of a dense map (binary PCD)");
+  command->add_option("--octomap", dense.octomap, "Occupancy by a dense map: .bt, or .ot with probabilities")
+      ->check(octomap_ending);
+  command
+      ->add_option("--resolution", dense.resolution,
+                   "Side of a cell of --octomap, metres; default that of dense.bt, else twice the spacing "
+                   "of points, at least 0.05")
+      ->check(CLI::Range(0.001, 10.0));
+  command->add_flag("--no-invented", dense.no_invented, "Leave out points that nobody saw");
   command->add_option("--keyframes", arguments->keyframes, "Poses of a flight's keyframes (TUM format)");
   command->add_option("--flight", arguments->flight,
                       "Flight whose keyframes are written, from 0; default the newest");

@@ -137,7 +137,8 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n"
       "  roslam run my_flight --camera my_camera.yaml --real-time --out live\n"
       "  roslam run another_flight --map live/map.roslam --out further\n"
-      "RUN then holds trajectory.txt and keyframes.txt (TUM format), dense.ply (the dense map), map.ply,\n"
+      "RUN then holds trajectory.txt and keyframes.txt (TUM format), dense.ply and dense.bt (the dense map), "
+      "map.ply,\n"
       "map.roslam, trajectory.png and run.json.\n"
       "Ctrl-C ends the run early and writes what was computed so far (exit code 0, \"interrupted\" in "
       "run.json).");

@@ -148,9 +148,14 @@ Surface DenseMapper::surface(WorldId world) const {
   if (voxels == nullptr) return {};
   const Surface surface = extract_surface(*voxels, options_);
   VisibilityCheck check(surface, voxel_size_, noise_);
-  for (const auto& [id, fused] : fused_)
-    if (fused.place.world == world) check.ask(unpack(fused.view), fused.place.T_world_camera);
+  visit(world, [&](const DenseView& view, const SE3& T_world_camera) { check.ask(view, T_world_camera); });
   return kept(surface, check.confirmed());
+}
+
+void DenseMapper::visit(
+    WorldId world, const std::function<void(const DenseView&, const SE3& T_world_camera)>& visitor) const {
+  for (const auto& [id, fused] : fused_)
+    if (fused.place.world == world) visitor(unpack(fused.view), fused.place.T_world_camera);
 }
 
 }  // namespace roslam

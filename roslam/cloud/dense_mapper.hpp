@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -39,6 +40,10 @@ class DenseMapper {
 
   /// The surfaces of a world, less what other views look through. Empty if nothing was fused there.
   Surface surface(WorldId world) const;
+
+  /// Hands out the views that were fused in a world, in the order of their keyframes, and where.
+  void visit(WorldId world,
+             const std::function<void(const DenseView&, const SE3& T_world_camera)>& visitor) const;
 
   double voxel_size() const { return voxel_size_; }       ///< metres; 0 before the first view
   std::size_t voxel_bytes() const;                        ///< of all worlds

@@ -99,6 +99,10 @@ void PlyReader::read_header() {
     }
   }
   if (!has_format) fail("its header names no format");
+  // Else any count of them would be read, from no bytes, for as long as it takes.
+  for (const PlyElement& element : elements_)
+    if (element.properties.empty() && element.count > 0)
+      fail("its element " + element.name + " has no properties");
 }
 
 double PlyReader::next(const std::string& type) {

@@ -130,6 +130,10 @@ void DenseWorker::drain() {
 DenseMap DenseWorker::result(WorldId world) const {
   DenseMap map;
   map.surface = mapper_.surface(world);
+  if (!map.surface.points.empty()) {
+    map.occupancy = std::make_shared<const Occupancy>(
+        occupancy_of(mapper_, world, map.surface, usual_resolution(mapper_.voxel_size())));
+  }
   map.voxel_size = mapper_.voxel_size();
   map.times_coarsened = mapper_.times_coarsened();
   map.keyframes = mapper_.keyframes().size();

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "roslam/cloud/dense_mapper.hpp"
 #include "roslam/cloud/dense_view.hpp"
+#include "roslam/cloud/occupancy.hpp"
 #include "roslam/cloud/surface.hpp"
 #include "roslam/map/ids.hpp"
 #include "roslam/pipeline/keyframe_worker.hpp"
@@ -35,11 +37,12 @@ struct DenseKeyframe {
 struct DenseMap {
   Surface surface;                    ///< world frame of the flight
   std::vector<SurfacePoint> removed;  ///< what was left out of it, as keyframes saw it; without normals
-  double voxel_size = 0.0;            ///< metres; 0: no keyframe had depth
-  int times_coarsened = 0;            ///< by a factor of two each, to stay within DenseOptions::max_memory
-  std::size_t keyframes = 0;          ///< that were fused
-  std::size_t dropped = 0;            ///< keyframes there was no time for
-  std::size_t moved = 0;              ///< times that a keyframe was fused anew as it had moved
+  std::shared_ptr<const Occupancy> occupancy;  ///< null if there are no surfaces
+  double voxel_size = 0.0;                     ///< metres; 0: no keyframe had depth
+  int times_coarsened = 0;    ///< by a factor of two each, to stay within DenseOptions::max_memory
+  std::size_t keyframes = 0;  ///< that were fused
+  std::size_t dropped = 0;    ///< keyframes there was no time for
+  std::size_t moved = 0;      ///< times that a keyframe was fused anew as it had moved
   std::size_t voxel_bytes = 0, view_bytes = 0;
   std::map<std::string, std::size_t> faults;  ///< what cost keyframes, in words
 };

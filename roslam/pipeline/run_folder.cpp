@@ -77,6 +77,8 @@ void RunFolder::write(const Slam& slam, const RunSummary& summary, const FrameSo
        if_any(has_new_map, Result::kKept)},
       {"dense.ply", [&](const Path& file) { write_surface_ply(file, summary.dense->surface, true); },
        if_any(summary.dense.has_value(), Result::kRemoved)},
+      {"dense.bt", [&](const Path& file) { summary.dense->occupancy->write(file); },
+       if_any(summary.dense && summary.dense->occupancy, Result::kRemoved)},
       {"report.html",
        [&](const Path& file) { write_file(file, run_page(slam, summary, description, path_)); }},
   };

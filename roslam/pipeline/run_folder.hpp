@@ -27,6 +27,7 @@ struct RunDescription {
 ///   keyframes.txt   poses of the keyframes (TUM format)
 ///   map.ply         landmarks with colour
 ///   dense.ply       the dense map, points and triangles, where one was made
+///   dense.bt        free and occupied space by it, for planners (OctoMap)
 ///   map.roslam      the map, for another flight; kept where there is no new one
 ///   trajectory.png  the way flown, seen from above
 ///   groundtruth.txt the true poses, where the source knows them (TUM format)
