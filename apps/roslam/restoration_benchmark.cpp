@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/restoration_benchmark.hpp"
 
-#include <cstdio>
 #include <fstream>
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/roslam/child_process.hpp"
+#include "apps/roslam/benchmark_steps.hpp"
 #include "apps/roslam/output.hpp"
 #include "apps/roslam/removal_truth.hpp"
 #include "apps/roslam/restoration_evaluation.hpp"
@@ -30,56 +29,44 @@ class Measurement {
  public:
   Measurement(const BenchmarkSequence& sequence, const RestorationBenchmarkSettings& settings,
               const std::stop_token& stop)
-      : sequence_(sequence), settings_(settings), stop_(stop), out_(settings.common.out) {}
+      : sequence_(sequence),
+        settings_(settings),
+        out_(settings.common.out),
+        steps_(out_, sequence.name, settings.common.quiet, stop) {}
 
   RestoredSequence measure() {
     RestoredSequence result{sequence_, {}, "", ""};
     try {
       if (sequence_.is_simulated()) render();
-      call({"run", sequence_.source, "--camera", sequence_.camera, "--out", folder("run").string(),
-            "--no-dense", "--quiet"},
-           "run");
+      steps_.call({"run", sequence_.source, "--camera", sequence_.camera, "--out", folder("run").string(),
+                   "--no-dense", "--quiet"},
+                  "run");
       for (const auto& method : settings_.methods) result.results.push_back(measure_method(method));
       result.figure = draw();
     } catch (const OutputError&) {
       throw;
     } catch (const std::exception& error) {
-      if (!stop_.stop_requested()) result.failure = error.what();
+      if (!steps_.stop().stop_requested()) result.failure = error.what();
     }
     return result;
   }
 
  private:
-  fs::path folder(const std::string& part) const { return out_ / "runs" / (sequence_.name + "-" + part); }
-
-  void call(const std::vector<std::string>& arguments, const std::string& part) {
-    if (!settings_.common.quiet) std::fprintf(stderr, "%s: %s\n", sequence_.name.c_str(), part.c_str());
-    make_folder(out_ / "runs");
-    const fs::path log = out_ / "runs" / (sequence_.name + "-" + part + ".stderr.txt");
-    const auto ended = run_this_program(arguments, log, stop_);
-    if (stop_.stop_requested()) throw InputError("interrupted");
-    if (ended.code != 0) throw InputError(part + " failed: " + ended.last_words);
-  }
+  fs::path folder(const std::string& step) const { return steps_.folder(step); }
 
   // A flight becomes a recording whose background is known.
   void render() {
     const auto& flight = settings_.common.settings;
-    const fs::path rendered = folder("rendered");
-    std::vector<std::string> arguments{"simulate",  sequence_.source.substr(sequence_.source.find(':') + 1),
-                                       "--out",     rendered.string(),
-                                       "--traffic", flight.traffic,
-                                       "--seed",    std::to_string(flight.seed)};
-    if (flight.frames > 0) arguments.insert(arguments.end(), {"--frames", std::to_string(flight.frames)});
-    call(arguments, "simulate");
-    sequence_.source = rendered.string();
-    sequence_.camera = (rendered / "camera.yaml").string();
+    steps_.simulate(sequence_, flight, flight.traffic, "d455", "rendered");
+    sequence_.source = folder("rendered").string();
+    sequence_.camera = (folder("rendered") / "camera.yaml").string();
   }
 
   RestorationResult measure_method(const std::string& method) {
     const fs::path restored = folder(method);
-    call({"restore", folder("run").string(), "--method", method, "--every", std::to_string(settings_.every),
-          "--out", restored.string(), "--quiet"},
-         method);
+    steps_.call({"restore", folder("run").string(), "--method", method, "--every",
+                 std::to_string(settings_.every), "--out", restored.string(), "--quiet"},
+                method);
     const auto report = nlohmann::json::parse(std::ifstream(restored / "restoration.json"));
     const auto& time = report.at("processor_milliseconds_a_frame");
     RestorationResult result{method, evaluate(restored, {}), std::nullopt,
@@ -101,10 +88,10 @@ class Measurement {
     if (!segmenter_ && !shipped_segmentation_model().empty())
       segmenter_ = std::make_unique<PspnetSegmenter>(shipped_segmentation_model());
     evaluation.segmenter = segmenter_.get();
-    evaluation.stop = stop_;
+    evaluation.stop = steps_.stop();
     evaluation.quiet = true;
     RestorationError error = evaluate_restoration(evaluation);
-    if (stop_.stop_requested()) throw InputError("interrupted");
+    if (steps_.stop().stop_requested()) throw InputError("interrupted");
     return error;
   }
 
@@ -167,8 +154,8 @@ class Measurement {
 
   BenchmarkSequence sequence_;
   const RestorationBenchmarkSettings& settings_;
-  std::stop_token stop_;
   fs::path out_;
+  BenchmarkSteps steps_;
   std::unique_ptr<Segmenter> segmenter_;
   std::optional<bool> has_actor_masks_;
 };
