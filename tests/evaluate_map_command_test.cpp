@@ -225,6 +225,24 @@ TEST_F(EvaluateMap, TakesTheDepthOfThingsFromWhereItIsBest) {
   EXPECT_EQ(figures("--truth sequence --background ideal --estimate run").at(0)["ghost_points"], 8 * 30);
 }
 
+// Clouds in one world, of which nothing else is known.
+TEST_F(EvaluateMap, ComparesFilesWithACloud) {
+  fs::create_directories(folder_ / "half");
+  write_surface_ply(folder_ / "truth.ply", wall(), false);
+  write_surface_ply(folder_ / "half/map.ply", wall(80), false);
+  const json found = figures("--truth truth.ply --estimate half/map.ply").at(0);
+  EXPECT_EQ(found["accuracy"], 1.0);
+  EXPECT_NEAR(found["completeness"].get<double>(), 0.5, 0.03);
+  EXPECT_EQ(found["ghost_points"], 0);
+  EXPECT_TRUE(found["trajectory_rmse_m"].is_null());
+  write_surface_ply(folder_ / "truth.ply", {}, false);
+  expect_refused(evaluate("--truth truth.ply --estimate half/map.ply --quiet"), {"truth.ply", "no points"});
+}
+
+TEST_F(EvaluateMap, TakesAMapForItsRun) {
+  EXPECT_EQ(figures("--truth sequence --estimate run/dense.ply").at(0)["accuracy"], 1.0);
+}
+
 TEST_F(EvaluateMap, AnEmptyMapIsComparedToo) {
   make_run("run", Surface());
   const json found = figures_of_one();

@@ -28,6 +28,9 @@ constexpr auto kExamples = R"(Examples:
     roslam simulate street --traffic heavy --frames 300 --depth ideal --out exact
     roslam evaluate map --truth street --background exact --estimate removed
 
+  With a cloud of the static scene that lies in the world of the map, as a laser scanner gives it:
+    roslam evaluate map --truth scan.ply --estimate removed/dense.ply
+
 A run needs dense.ply and trajectory.txt; poses of equal times put its map into the world of groundtruth.txt.
 Accuracy is the share of the map's points near the static truth, completeness the share of the truth near the map.
 Ghosts are points near to what moved and far from what is static; points on parked cars and the like are right
@@ -72,11 +75,12 @@ void require_options(MapEvaluationSettings& settings) {
 void add_truth_options(CLI::App& command, Arguments& arguments) {
   MapSequenceSettings& truth = arguments.settings.truth;
   command
-      .add_option("--truth", truth.sequence,
-                  "A sequence that roslam simulate or compose wrote, or any in the TUM format with "
-                  "groundtruth.txt and --background")
+      .add_option(
+          "--truth", truth.sequence,
+          "A sequence that roslam simulate or compose wrote, any in the TUM format with groundtruth.txt "
+          "and --background, or a PLY file in the world of the maps")
       ->required()
-      ->type_name("DIR");
+      ->type_name("PATH");
   command
       .add_option(
           "--background", truth.background,
@@ -102,9 +106,9 @@ void add_evaluate_map_command(CLI::App& evaluate) {
   add_truth_options(*command, *arguments);
   command
       ->add_option("--estimate", arguments->estimates,
-                   "Run folders, also as NAME=DIR; a column of the table each")
+                   "Run folders or dense maps in them, also as NAME=PATH; a column of the table each")
       ->required()
-      ->type_name("DIR");
+      ->type_name("PATH");
   command
       ->add_option(
           "--reference", settings.reference,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -25,13 +26,22 @@ struct PlacedMap {
   double rmse = 0.0;  // metres
 };
 
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+fs::path map_of(const fs::path& run) {
+  if (is_file(run)) return run;
+  fs::path file = run / "dense.ply";
+  if (!is_file(file)) throw InputError(file.string() + ": is missing; repeat the run without --no-dense");
+  return file;
+}
+
 // Also tells what is missing, before the truth is gathered, which takes long.
 PlacedMap place(const fs::path& run, const Trajectory& truth) {
-  PlacedMap map{run / "dense.ply", {}, 0.0};
-  std::error_code error;
-  if (!fs::is_regular_file(map.file, error))
-    throw InputError(map.file.string() + ": is missing; repeat the run without --no-dense");
-  const fs::path file = run / "trajectory.txt";
+  PlacedMap map{map_of(run), {}, 0.0};
+  const fs::path file = map.file.parent_path() / "trajectory.txt";
   AssociationOptions association;
   association.interpolate = true;
   const auto pairs = associate(truth, read_trajectory(file).trajectory, association);
@@ -77,7 +87,25 @@ MapTruth gather(const MapEvaluationSettings& settings, const MapSequence& sequen
 }
 }  // namespace
 
+namespace {
+// Maps and truth are in one world.
+std::vector<EvaluatedMap> compare_with_cloud(const MapEvaluationSettings& settings) {
+  const Surface truth = read_surface_ply(settings.truth.sequence);
+  if (truth.points.empty())
+    throw InputError(settings.truth.sequence.string() + ": has no points; give another truth");
+  MapComparison comparison(MapTruth(truth, settings.truth_options), settings.error_options);
+  if (!settings.reference.empty()) comparison.set_reference(read_surface_ply(map_of(settings.reference)));
+  std::vector<EvaluatedMap> maps;
+  for (const auto& run : settings.estimates) {
+    maps.push_back({run.name, std::numeric_limits<double>::quiet_NaN(),
+                    comparison.error(read_surface_ply(map_of(run.path)))});
+  }
+  return maps;
+}
+}  // namespace
+
 std::vector<EvaluatedMap> evaluate_maps(const MapEvaluationSettings& settings) {
+  if (is_file(settings.truth.sequence)) return compare_with_cloud(settings);
   const MapSequence sequence(settings.truth);
   std::vector<PlacedMap> placed;
   for (const auto& run : settings.estimates) placed.push_back(place(run.path, sequence.trajectory()));

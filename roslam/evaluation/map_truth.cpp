@@ -50,6 +50,12 @@ MapTruth::MapTruth(const Camera& camera, const MapTruthOptions& options)
   }
 }
 
+MapTruth::MapTruth(const Surface& surface, const MapTruthOptions& options) : options_(options) {
+  options.validate();
+  for (const SurfacePoint& point : surface.points)
+    add_static(point.position.cast<double>(), 0.0F, point.colour);
+}
+
 void MapTruth::check(const MapTruthFrame& frame) const {
   const auto require = [&](const cv::Mat& image, int type, const char* name) {
     if (image.type() == type && image.size() == cv::Size(camera_.width, camera_.height)) return;

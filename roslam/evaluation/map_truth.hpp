@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "roslam/cloud/surface.hpp"
 #include "roslam/evaluation/removal_error.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/se3.hpp"
@@ -55,6 +56,10 @@ class MapTruth {
  public:
   /// Throws OptionsError or CalibrationError.
   explicit MapTruth(const Camera& camera, const MapTruthOptions& options = {});
+
+  /// All of it in one cloud, of which a map should have everything and in which nothing moves. Throws
+  /// OptionsError.
+  explicit MapTruth(const Surface& surface, const MapTruthOptions& options = {});
 
   /// Throws InputError if an image is not of the camera's size or of another type.
   void add(const MapTruthFrame& frame);
