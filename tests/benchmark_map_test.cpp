@@ -32,7 +32,7 @@ TEST_F(BenchmarkMap, ComparesTheMapsOfEveryStep) {
                   maps["removal only"]["ghost_points"].get<int>()));
   EXPECT_LT(maps["all"]["missing_of_reference"], maps["removal only"]["missing_of_reference"]);
   EXPECT_EQ(maps["empty scene"]["missing_of_reference"], 0.0);
-  EXPECT_GT(maps["empty scene"]["f_score"], maps["removal only"]["f_score"]);
+  EXPECT_GT(maps["empty scene"]["completeness"], maps["removal only"]["completeness"]);
   const double open = maps["removal only"]["missing_of_reference"],
                left = maps["all"]["missing_of_reference"];
   EXPECT_NEAR(sequence["filled_share"].get<double>(), 1.0 - left / open, 1e-9);

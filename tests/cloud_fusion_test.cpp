@@ -208,4 +208,28 @@ TEST(VisibilityCheck, FindsWhatEarlierViewsLookedThrough) {
   EXPECT_EQ(points_on(rest, kThing, 0.06), 0U);
   EXPECT_EQ(points_on(rest, kWall, 0.02), points_on(surface, kWall, 0.02));
 }
+
+// Two views invented the wall, one something before it. Against what was seen inventions say nothing.
+TEST(VisibilityCheck, LetsInventionsOutvoteEachOther) {
+  const Camera camera = scene::small_camera();
+  const auto ask = [&](Provenance provenance) {
+    const auto view = [&](const std::vector<cloud_scene::Slab>& slabs, Provenance of) {
+      return cloud_scene::view(cloud_scene::show(slabs, SE3(), camera), camera, cloud_scene::options(), of);
+    };
+    const DenseView wall = view({kWall, kFloor}, Provenance::kInvented);
+    const DenseView thing = view({kWall, kFloor, kThing}, provenance);
+    VoxelMap map(0.05, cloud_scene::options(), {});
+    map.integrate(thing, SE3());
+    const Surface surface = extract_surface(map, {});
+    EXPECT_GT(points_on(surface, kThing, 0.06), 100U);
+    VisibilityCheck check(surface, 0.05, {});
+    for (const DenseView* asked : {&wall, &thing, &wall}) check.ask(*asked, SE3());
+    const Surface rest = kept(surface, check.confirmed());
+    EXPECT_GT(points_on(rest, kWall, 0.02), 100U);
+    return std::pair(points_on(rest, kThing, 0.06), points_on(surface, kThing, 0.06));
+  };
+  EXPECT_EQ(ask(Provenance::kInvented).first, 0U);
+  const auto [left, all] = ask(Provenance::kMeasured);
+  EXPECT_EQ(left, all);
+}
 }  // namespace

@@ -8,6 +8,7 @@
 #include "apps/roslam/benchmark_steps.hpp"
 #include "apps/roslam/map_evaluation.hpp"
 #include "apps/roslam/output.hpp"
+#include "apps/roslam/tum_writer.hpp"
 #include "roslam/cloud/map_picture.hpp"
 #include "roslam/cloud/surface_file.hpp"
 #include "roslam/error.hpp"
@@ -90,11 +91,25 @@ class Measurement {
     const BenchmarkSettings& flight = settings_.common.settings;
     steps_.simulate(sequence_, flight, flight.traffic, "d455", "rendered");
     steps_.simulate(sequence_, flight, flight.traffic, "ideal", "exact");
-    steps_.simulate(sequence_, flight, "none", "d455", "rendered_empty");
     sequence_.source = steps_.folder("rendered").string();
     sequence_.camera = (steps_.folder("rendered") / "camera.yaml").string();
-    empty_ = steps_.folder("rendered_empty").string();
+    empty_ = write_empty_scene();
     truth_ = {sequence_.source, steps_.folder("exact"), sequence_.camera};
+  }
+
+  // The background of the flight as a recording of its own.
+  std::string write_empty_scene() const {
+    const fs::path folder = steps_.folder("empty_scene");
+    make_folder(folder);
+    TextFile colours(folder / "rgb.txt"), depths(folder / "depth.txt");
+    for (const SequencePicture& picture : background_of(sequence_.source)) {
+      const std::string time = time_text(*picture.timestamp);
+      colours.line(time + " " + fs::relative(picture.colour, folder).string());
+      depths.line(time + " " + fs::relative(picture.depth, folder).string());
+    }
+    colours.close();
+    depths.close();
+    return folder.string();
   }
 
   void map(const Variant& variant, const std::string& source) {

@@ -20,8 +20,8 @@ VisibilityCheck::VisibilityCheck(const Surface& surface, double voxel_size, cons
     : surface_(surface),
       voxel_size_(static_cast<float>(voxel_size)),
       noise_(noise),
-      seen_(surface.points.size()),
-      seen_through_(surface.points.size()) {}
+      votes_(surface.points.size()),
+      invented_(surface.points.size()) {}
 
 void VisibilityCheck::ask(const DenseView& view, const SE3& T_world_camera) {
   const Motion camera_from_world(T_world_camera.inverse());
@@ -38,21 +38,24 @@ void VisibilityCheck::ask(const DenseView& view, const SE3& T_world_camera) {
     const float depth = view.depth.at<float>(row, column);
     const bool is_invented =
         view.provenance.at<std::uint8_t>(row, column) == static_cast<std::uint8_t>(Provenance::kInvented);
-    if (depth == 0.0F || is_invented) continue;
+    // What was invented says nothing against what was seen, but something against other inventions.
+    if (depth == 0.0F || (is_invented && point.provenance != Provenance::kInvented)) continue;
+    Votes& votes = is_invented ? invented_[i] : votes_[i];
     const float cosine = std::abs((camera_from_world.rotation * point.normal).dot(at)) / at.norm();
     const auto sigma = static_cast<float>(noise_.sigma_of_depth(static_cast<double>(depth)));
     const float tolerance = kDeviations * sigma + voxel_size_ / std::max(cosine, kFlattest);
     if (depth - at.z() > tolerance) {
-      seen_through_[i] += 1.0F / sigma;
+      votes.through += 1.0F / sigma;
     } else if (depth - at.z() > -tolerance) {
-      seen_[i] += 1.0F / sigma;
+      votes.seen += 1.0F / sigma;
     }
   }
 }
 
 std::vector<bool> VisibilityCheck::confirmed() const {
-  std::vector<bool> result(seen_.size());
-  for (std::size_t i = 0; i < seen_.size(); ++i) result[i] = seen_through_[i] <= kThroughAtMost * seen_[i];
+  const auto agree = [](const Votes& votes) { return votes.through <= kThroughAtMost * votes.seen; };
+  std::vector<bool> result(votes_.size());
+  for (std::size_t i = 0; i < votes_.size(); ++i) result[i] = agree(votes_[i]) && agree(invented_[i]);
   return result;
 }
 

@@ -18,7 +18,8 @@ class VisibilityCheck {
   /// voxel_size: metres, of the map that the surface is of. The surface must outlive the check.
   VisibilityCheck(const Surface& surface, double voxel_size, const MeasurementNoise& noise);
 
-  /// Lets a view say what it sees of the surface. What was invented in it has no say.
+  /// Lets a view say what it sees of the surface. What was invented in it has a say only about what was
+  /// invented in others: where inventions differ, those of few views go.
   void ask(const DenseView& view, const SE3& T_world_camera);
 
   /// For each point, whether enough of those that should see it do. Views weigh by the noise of their
@@ -29,7 +30,12 @@ class VisibilityCheck {
   const Surface& surface_;
   float voxel_size_;
   MeasurementNoise noise_;
-  std::vector<float> seen_, seen_through_;  // sums of weights, one a point
+  // Sums of the weights of views that see a point and of those that look through it.
+  struct Votes {
+    float seen = 0.0F, through = 0.0F;
+  };
+  std::vector<Votes> votes_;     // one a point, of what was seen
+  std::vector<Votes> invented_;  // of what was invented, about points that were
 };
 
 }  // namespace roslam
