@@ -209,6 +209,25 @@ TEST(VisibilityCheck, FindsWhatEarlierViewsLookedThrough) {
   EXPECT_EQ(points_on(rest, kWall, 0.02), points_on(surface, kWall, 0.02));
 }
 
+TEST(VisibilityCheck, CountsViewsThatSeeSomethingBeyondTheirReach) {
+  const Camera camera = scene::small_camera();
+  DenseOptions options = cloud_scene::options();
+  options.max_depth = 3.0;  // the wall is 4 m away
+  const auto view = [&](const std::vector<cloud_scene::Slab>& slabs) {
+    return cloud_scene::view(cloud_scene::show(slabs, SE3(), camera), camera, options);
+  };
+  const DenseView empty = view({kWall, kFloor}), ghost = view({kWall, kFloor, kThing});
+  VoxelMap map(0.05, options, {});
+  map.integrate(ghost, SE3());
+  const Surface surface = extract_surface(map, {});
+  ASSERT_GT(points_on(surface, kThing, 0.06), 100U);
+  VisibilityCheck check(surface, 0.05, {});
+  for (const DenseView* asked : {&empty, &ghost, &empty}) check.ask(*asked, SE3());
+  const Surface rest = kept(surface, check.confirmed());
+  EXPECT_EQ(points_on(rest, kThing, 0.06), 0U);
+  EXPECT_EQ(points_on(rest, kFloor, 0.02), points_on(surface, kFloor, 0.02));
+}
+
 // Two views invented the wall, one something before it. Against what was seen inventions say nothing.
 TEST(VisibilityCheck, LetsInventionsOutvoteEachOther) {
   const Camera camera = scene::small_camera();

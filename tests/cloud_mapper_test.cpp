@@ -191,6 +191,22 @@ TEST(ViewReducer, TakesTheLensAway) {
       EXPECT_NEAR(view.depth.at<float>(y, x), 2.0 + 0.001 * x * options.stride, 0.0012);
 }
 
+TEST(ViewReducer, KnowsWhatLiesBeyondItsReach) {
+  const Walk walk;
+  DenseOptions options = cloud_scene::options();
+  options.max_depth = 3.5;
+  const auto picture = cloud_scene::show({kWall, kFloor}, SE3(), walk.camera);  // the wall is 4 m away
+  cv::Mat hidden = cv::Mat::zeros(picture.depth.size(), CV_8UC1);
+  hidden.colRange(0, 40).setTo(255);
+  const DenseView view = unpack(
+      pack(ViewReducer(walk.camera, options, {}).reduce(picture.colour, picture.depth, {}, {}, hidden)));
+  EXPECT_EQ(view.reach, 3.5);
+  EXPECT_EQ(view.beyond.at<std::uint8_t>(10, 60), 255);
+  EXPECT_EQ(view.depth.at<float>(10, 60), 0.0F);
+  EXPECT_EQ(view.beyond.at<std::uint8_t>(view.beyond.rows - 3, 60), 0);
+  EXPECT_EQ(cv::countNonZero(view.beyond.colRange(0, 20)), 0);
+}
+
 TEST(ViewReducer, HidesWhatIsHidden) {
   const Walk walk;
   const auto picture = cloud_scene::show({kWall}, SE3(), walk.camera);

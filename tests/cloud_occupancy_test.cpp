@@ -108,6 +108,21 @@ TEST(Occupancy, TakesNothingForFreeThatNobodyMeasured) {
   EXPECT_EQ(space.at({-0.6, 0.0, 2.0}), Space::kUnknown);
 }
 
+// What is seen lies beyond what is fused: up to there nothing is in the way.
+TEST(Occupancy, IsFreeUpToTheReachWhereAllIsFarther) {
+  const Camera camera = scene::small_camera();
+  DenseOptions options = cloud_scene::options();
+  options.max_depth = 2.0;
+  const auto picture = cloud_scene::show({kFacing}, SE3(), camera);
+  Occupancy space(kCell);
+  space.add_view(cloud_scene::view(picture, camera, options), SE3());
+  for (int z = 3; z < 20; ++z) EXPECT_EQ(space.at(centre(0, 0, z)), Space::kFree) << z;
+  for (int z = 20; z < 45; ++z) EXPECT_EQ(space.at(centre(0, 0, z)), Space::kUnknown) << z;
+  Occupancy invented(kCell);
+  invented.add_view(cloud_scene::view(picture, camera, options, Provenance::kInvented), SE3());
+  EXPECT_EQ(invented.free_volume(), 0.0);
+}
+
 TEST(Occupancy, IsOccupiedWhereAPointIsWhateverComesFirst) {
   const Surface thing = points({{0.05F, 0.05F, 2.05F}, {0.05F, 0.15F, 2.05F}});
   Occupancy before(kCell), after(kCell);

@@ -57,3 +57,12 @@ run_step(${WORK}/build/restore_scene ${WORK}/flight ${WORK}/flight/camera.yaml $
 if(NOT EXISTS ${WORK}/restored/0.png)
   message(FATAL_ERROR "the example restored no keyframe")
 endif()
+
+# A dense map.
+run_step(${WORK}/build/dense_map ${WORK}/flight ${WORK}/flight/camera.yaml ${WORK}/prefix/share/roslam/models
+  ${WORK}/mapped)
+foreach(file map.ply map.bt)
+  if(NOT EXISTS ${WORK}/mapped/${file})
+    message(FATAL_ERROR "the example wrote no ${file}")
+  endif()
+endforeach()

@@ -46,11 +46,11 @@ PackedView pack(const DenseView& view) {
   cv::Mat millimetres;
   view.depth.convertTo(millimetres, CV_16UC1, kUnitsPerMetre);
   cv::Mat marks;
-  cv::merge(std::array<cv::Mat, 3>{view.labels, view.provenance, cv::Mat::zeros(view.labels.size(), CV_8UC1)},
-            marks);
+  const cv::Mat beyond = view.beyond.empty() ? cv::Mat::zeros(view.labels.size(), CV_8UC1) : view.beyond;
+  cv::merge(std::array<cv::Mat, 3>{view.labels, view.provenance, beyond}, marks);
   const std::vector<int> fast{cv::IMWRITE_PNG_COMPRESSION, 1};
   return {view.camera, encoded(".jpg", view.colour, {cv::IMWRITE_JPEG_QUALITY, kColourQuality}),
-          encoded(".png", millimetres, fast), encoded(".png", marks, fast)};
+          encoded(".png", millimetres, fast), encoded(".png", marks, fast), view.reach};
 }
 
 DenseView unpack(const PackedView& packed) {
@@ -61,6 +61,8 @@ DenseView unpack(const PackedView& packed) {
   const cv::Mat marks = cv::imdecode(packed.marks, cv::IMREAD_UNCHANGED);
   cv::extractChannel(marks, view.labels, 0);
   cv::extractChannel(marks, view.provenance, 1);
+  cv::extractChannel(marks, view.beyond, 2);
+  view.reach = packed.reach;
   return view;
 }
 
@@ -84,7 +86,10 @@ DenseView ViewReducer::reduce(const cv::Mat& colour, const cv::Mat& depth, const
                               const cv::Mat& provenance, const cv::Mat& hidden) const {
   cv::Mat kept = cv::Mat::zeros(colour.size(), CV_32FC1);
   if (!depth.empty()) depth.copyTo(kept, clear_of_edges(depth, depth_));
+  cv::Mat beyond;
+  if (!depth.empty()) beyond = depth > depth_.max_depth;
   if (!hidden.empty()) kept.setTo(0, hidden);
+  if (!hidden.empty() && !beyond.empty()) beyond.setTo(0, hidden);
   DenseView view;
   view.camera = reduced_;
   const auto nearest = [&](const cv::Mat& image, double otherwise) {
@@ -97,6 +102,9 @@ DenseView ViewReducer::reduce(const cv::Mat& colour, const cv::Mat& depth, const
   view.depth = nearest(kept, 0.0);
   view.labels = nearest(labels, kVoid);
   view.provenance = nearest(provenance, static_cast<double>(Provenance::kMeasured));
+  view.beyond = nearest(beyond, 0.0);
+  view.beyond.setTo(0, view.provenance != static_cast<double>(Provenance::kMeasured));
+  view.reach = depth_.max_depth;
   view.labels.setTo(kVoid, view.provenance != static_cast<double>(Provenance::kMeasured));
   return view;
 }

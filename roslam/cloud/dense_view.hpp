@@ -16,11 +16,13 @@ namespace roslam {
 
 /// A picture of the static scene as it is fused: smaller than it was taken, without lens distortion.
 struct DenseView {
-  Camera camera;       ///< pinhole of the smaller picture
-  cv::Mat colour;      ///< CV_8UC3, BGR
-  cv::Mat depth;       ///< CV_32FC1 metres, 0 = nothing to fuse
-  cv::Mat labels;      ///< CV_8UC1, kVoid = unknown
-  cv::Mat provenance;  ///< CV_8UC1, values of Provenance
+  Camera camera;        ///< pinhole of the smaller picture
+  cv::Mat colour;       ///< CV_8UC3, BGR
+  cv::Mat depth;        ///< CV_32FC1 metres, 0 = nothing to fuse
+  cv::Mat labels;       ///< CV_8UC1, kVoid = unknown
+  cv::Mat provenance;   ///< CV_8UC1, values of Provenance
+  cv::Mat beyond = {};  ///< CV_8UC1, nonzero where what is seen lies beyond the reach; may be empty
+  double reach = 0.0;   ///< metres up to which depth is fused
 };
 
 /// A view in little memory. What is lost (depth is kept in millimetres) is lost before it is fused for the
@@ -28,6 +30,7 @@ struct DenseView {
 struct PackedView {
   Camera camera;
   std::vector<std::uint8_t> colour, depth, marks;
+  double reach = 0.0;  ///< metres
 
   std::size_t bytes() const { return colour.size() + depth.size() + marks.size(); }
 };

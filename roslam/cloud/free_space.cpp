@@ -13,18 +13,28 @@ bool is_reading(const DenseView& view, int x, int y) {
          view.provenance.at<std::uint8_t>(y, x) == static_cast<std::uint8_t>(Provenance::kMeasured);
 }
 
+// Depth up to which a pixel was looked through, and whether there is something there; 0 where nobody looked.
+struct Sight {
+  double depth = 0.0;  // metres
+  bool has_end = false;
+};
+
+Sight sight_of(const DenseView& view, int x, int y) {
+  if (is_reading(view, x, y)) return {static_cast<double>(view.depth.at<float>(y, x)), true};
+  const bool is_beyond = !view.beyond.empty() && view.beyond.at<std::uint8_t>(y, x) != 0;
+  return {is_beyond ? view.reach : 0.0, false};
+}
+
 // Pixels from one ray to the next so that at the farthest reading they are half a cell apart at most: then no
 // cell that is looked through lies between rays.
 int ray_stride(const DenseView& view, double resolution) {
   constexpr int kMost = 8;
-  float deepest = 0.0F;
+  double deepest = 0.0;
   for (int y = 0; y < view.depth.rows; ++y)
-    for (int x = 0; x < view.depth.cols; ++x)
-      if (is_reading(view, x, y)) deepest = std::max(deepest, view.depth.at<float>(y, x));
-  if (deepest == 0.0F) return kMost;
+    for (int x = 0; x < view.depth.cols; ++x) deepest = std::max(deepest, sight_of(view, x, y).depth);
+  if (deepest == 0.0) return kMost;
   const double focal = std::min(view.camera.fx, view.camera.fy);
-  return static_cast<int>(
-      std::clamp(0.5 * resolution * focal / static_cast<double>(deepest), 1.0, static_cast<double>(kMost)));
+  return static_cast<int>(std::clamp(0.5 * resolution * focal / deepest, 1.0, static_cast<double>(kMost)));
 }
 
 // Marks cells, those in a block that was marked last without looking for it again.
@@ -100,13 +110,12 @@ CellSet cells_seen_through(const DenseView& view, const SE3& T_world_camera, dou
   const int stride = ray_stride(view, resolution);
   for (int y = 0; y < view.depth.rows; y += stride) {
     for (int x = 0; x < view.depth.cols; x += stride) {
-      if (!is_reading(view, x, y)) continue;
+      const Sight sight = sight_of(view, x, y);
+      if (sight.depth == 0.0) continue;
       const Eigen::Vector3d end =
-          rotation *
-              view.camera.unproject(Eigen::Vector2d(x, y), static_cast<double>(view.depth.at<float>(y, x))) +
-          T_world_camera.translation();
+          rotation * view.camera.unproject(Eigen::Vector2d(x, y), sight.depth) + T_world_camera.translation();
       if (!find_cell(end, scale, cell)) continue;
-      end_marker.mark(cell);
+      if (sight.has_end) end_marker.mark(cell);
       // Of rays that end within half a cell of each other, one says it all.
       const Eigen::Vector3i half = (end.array() * (2.0 * scale)).floor().cast<int>();
       if (ray_marker.mark(half)) mark_line(T_world_camera.translation() * scale, end * scale, free_marker);

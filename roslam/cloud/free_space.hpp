@@ -14,9 +14,9 @@ inline constexpr int kFarthestCell = 32768;
 /// false.
 bool find_cell(const Eigen::Vector3d& point, double scale, Eigen::Vector3i& cell);
 
-/// The cells that a view sees through: those that lie between the camera and readings that were measured,
-/// less those that a reading lies in. Nobody looked along the rays to pixels that were filled in. resolution:
-/// metres, the side of a cell.
+/// The cells that a view sees through: those that lie between the camera and readings that were measured, or
+/// the view's reach where they are farther, less those that a reading lies in. Nobody looked along the rays
+/// to pixels that were filled in. resolution: metres, the side of a cell.
 CellSet cells_seen_through(const DenseView& view, const SE3& T_world_camera, double resolution);
 
 }  // namespace roslam

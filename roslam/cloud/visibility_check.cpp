@@ -35,7 +35,8 @@ void VisibilityCheck::ask(const DenseView& view, const SE3& T_world_camera) {
     const float u = at.x() / at.z() * fx + cx, v = at.y() / at.z() * fy + cy;
     if (!(u >= 0.0F && v >= 0.0F && u < columns && v < rows)) continue;
     const int column = static_cast<int>(u), row = static_cast<int>(v);
-    const float depth = view.depth.at<float>(row, column);
+    const bool is_beyond = !view.beyond.empty() && view.beyond.at<std::uint8_t>(row, column) != 0;
+    const float depth = is_beyond ? static_cast<float>(view.reach) : view.depth.at<float>(row, column);
     const bool is_invented =
         view.provenance.at<std::uint8_t>(row, column) == static_cast<std::uint8_t>(Provenance::kInvented);
     // What was invented says nothing against what was seen, but something against other inventions.
@@ -46,7 +47,7 @@ void VisibilityCheck::ask(const DenseView& view, const SE3& T_world_camera) {
     const float tolerance = kDeviations * sigma + voxel_size_ / std::max(cosine, kFlattest);
     if (depth - at.z() > tolerance) {
       votes.through += 1.0F / sigma;
-    } else if (depth - at.z() > -tolerance) {
+    } else if (!is_beyond && depth - at.z() > -tolerance) {
       votes.seen += 1.0F / sigma;
     }
   }
