@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -155,6 +156,28 @@ TEST(MapPicture, ShowsThingsWhereTheyAreFromAbove) {
   const Eigen::Vector2d along = view.camera.project(view.T_world_camera.inverse() * Eigen::Vector3d(4, 2, 0));
   EXPECT_GT(along.x(), origin.x());
   EXPECT_LT(along.y(), origin.y());
+}
+
+// A floor and a wall, of a world whose first camera looked down by 20 degrees.
+TEST(MapPicture, IsLevelWhereTheWorldIsNot) {
+  const Eigen::Matrix3f tilt =
+      Eigen::AngleAxisf(0.35F, Eigen::Vector3f(0.6F, -0.8F, 0.0F)).toRotationMatrix();
+  Surface surface;
+  for (int i = 0; i < 40; ++i) {
+    for (int k = 0; k < 40; ++k) {
+      const float a = 0.1F * static_cast<float>(i), b = 0.1F * static_cast<float>(k);
+      surface.points.push_back({tilt * Eigen::Vector3f(a, b, 0.0F), tilt.col(2), {0, 200, 0}});
+      surface.points.push_back({tilt * Eigen::Vector3f(0.0F, a, b), tilt.col(0), {200, 0, 0}});
+    }
+  }
+  EXPECT_LT((up_of(surface) - tilt.col(2)).norm(), 1e-3F);
+  // From above the wall is a line.
+  const cv::Mat picture = draw_surface(surface, top_view(surface, {200, 200}), MapColour::kRgb, 0.1);
+  cv::Mat wall;
+  cv::inRange(picture, cv::Scalar(200, 0, 0), cv::Scalar(200, 0, 0), wall);
+  EXPECT_LT(cv::countNonZero(wall), 200 * 12);
+  surface.points.resize(100);  // too few to tell
+  EXPECT_EQ(up_of(surface), Eigen::Vector3f::UnitZ());
 }
 
 TEST(MapPicture, ColoursByWhatIsAsked) {
