@@ -21,6 +21,11 @@ TEST_F(DenseRun, IsWrittenByDefault) {
   EXPECT_GT(surface.points.size(), 5000U);
   EXPECT_GT(surface.triangles.size(), surface.points.size());
   EXPECT_EQ(surface.spacing, 0.05);
+  const auto has_class = [&](int label) {
+    return std::count_if(surface.points.begin(), surface.points.end(),
+                         [&](const SurfacePoint& point) { return point.label == label; });
+  };
+  EXPECT_GT(has_class(0), static_cast<long>(surface.points.size() / 4));  // road
   const auto dense = report()["dense"];
   EXPECT_EQ(dense["points"], surface.points.size());
   EXPECT_EQ(dense["times_coarsened"], 0);
@@ -100,7 +105,6 @@ TEST_F(DenseRun, IsEmptyWhereAllIsOutOfRange) {
       {"dense.ply", "empty"});
 }
 
-// A recording that becomes colour alone after its first frames.
 TEST_F(DenseRun, DoesWithoutDepth) {
   for (std::size_t i = 0; i < kFrames; ++i) fs::remove(depth(i));
   const Outcome outcome = run();
@@ -111,9 +115,12 @@ TEST_F(DenseRun, DoesWithoutDepth) {
 TEST_F(DenseRun, KeepsTheOldMapWhereTheNewOneCannotBeWritten) {
   frames_of_run();
   const std::string before = content(run_ / "dense.ply");
-  fs::create_directory(run_ / "dense.ply.part");  // in the way of the new one
+  const std::string report_before = content(run_ / "report.html");
+  for (const char* file : {"dense.ply", "report.html"})
+    fs::create_directory(run_ / (std::string(file) + ".part"));  // in the way of the new one
   expect_refused(run(), {"dense.ply"});
   EXPECT_TRUE(content(run_ / "dense.ply") == before);
+  EXPECT_TRUE(content(run_ / "report.html") == report_before);
   EXPECT_EQ(trajectory().size(), kFrames);
 }
 

@@ -63,6 +63,11 @@ class Worker : public testing::Test {
         [this](const RestoredKeyframe& keyframe) {
           const std::scoped_lock lock(mutex_);
           restored_.push_back(keyframe);
+          if (taker_fails_) throw OutputError("nobody takes it");
+        },
+        [this](KeyframeId keyframe) {
+          const std::scoped_lock lock(mutex_);
+          left_.push_back(keyframe);
         });
   }
 
@@ -100,6 +105,8 @@ class Worker : public testing::Test {
   std::map<unsigned, WorldId> worlds_;
   SE3 shift_;  // of all keyframes, as a correction of the map makes it
   std::vector<RestoredKeyframe> restored_;
+  bool taker_fails_ = false;
+  std::vector<KeyframeId> left_;  // dropped, or failed
   std::optional<RestorationWorker> worker_;
 };
 
@@ -150,6 +157,15 @@ TEST_F(Worker, DropsTheOldestRatherThanToMakeAnybodyWait) {
   EXPECT_EQ(restored_[0].keyframe, KeyframeId{1});
   EXPECT_EQ(restored_[1].keyframe, KeyframeId{5});
   EXPECT_EQ(restored_[2].keyframe, KeyframeId{6});
+  EXPECT_EQ(left_, (std::vector<KeyframeId>{KeyframeId{2}, KeyframeId{3}, KeyframeId{4}}));
+}
+
+TEST_F(Worker, TellsOfKeyframesThatNobodyCouldTake) {
+  start(Mode::kDeterministic);
+  taker_fails_ = true;
+  submit(1, 0.0);
+  EXPECT_EQ(left_, std::vector<KeyframeId>{KeyframeId{1}});
+  EXPECT_EQ(worker_->faults(), (std::map<std::string, std::size_t>{{"nobody takes it", 1}}));
 }
 
 TEST_F(Worker, ANetworkThatFailsCostsAKeyframeAndNothingElse) {
@@ -158,6 +174,7 @@ TEST_F(Worker, ANetworkThatFailsCostsAKeyframeAndNothingElse) {
   submit(1, 0.0);
   EXPECT_TRUE(restored_.empty());
   EXPECT_EQ(worker_->faults(), (std::map<std::string, std::size_t>{{"the network is ill", 1}}));
+  EXPECT_EQ(left_, std::vector<KeyframeId>{KeyframeId{1}});
   inpainter_->fails = false;
   submit(2, 0.0);
   EXPECT_EQ(restored_.size(), 1U);

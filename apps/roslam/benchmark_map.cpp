@@ -35,7 +35,9 @@ void execute(const MapBenchmarkSettings& settings, const std::string& version) {
   const auto sequences = find_sequences(settings.common.sequences, settings.common.camera);
   if (!settings.truth.empty() && sequences.size() != 1)
     throw CLI::ValidationError("--truth", "is of one sequence; give one");
-  MapBenchmarkReport report{header_of(settings.common, version), {}};
+  if (!settings.truth.empty() && sequences.front().is_simulated())
+    throw CLI::ValidationError("--truth", "is known of a simulated flight; leave it out");
+  MapBenchmarkReport report{header_of(settings.common, version), settings.range, {}};
   const auto write = [&] {
     report.is_interrupted = interrupt.token().stop_requested();
     write_file(out / "benchmark.md", map_benchmark_markdown(report));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -50,6 +51,11 @@ void run(const Arguments& arguments) {
   settings.estimates = parse_named(arguments.estimates);
   make_names_differ({&settings.estimates});
   settings.quiet |= arguments.json;
+  std::error_code error;
+  const MapSequenceSettings& truth = settings.truth;
+  if (std::filesystem::is_regular_file(truth.sequence, error) &&
+      !(truth.background.empty() && truth.camera.empty()))
+    throw CLI::ValidationError("--truth", "is a PLY file, which needs neither --background nor --camera");
   if (arguments.truth_depth_units > 0.0) settings.truth.background_depth_units = arguments.truth_depth_units;
   const auto maps = evaluate_maps(settings);
   std::cout << (arguments.json ? to_json(maps, settings.truth_options, settings.error_options)

@@ -22,7 +22,7 @@ Surface read_points(const fs::path& map, const DenseExport& what) {
   Surface surface = read_surface_ply(map);
   if (surface.points.empty()) {
     throw InputError(map.string() +
-                     ": the map is empty, as no keyframe had depth that could be fused; fly where things are "
+                     ": the map is empty, as nothing was fused into it; fly where things are "
                      "nearer than dense.max_depth and check the camera's depth units");
   }
   if (!what.no_invented) return surface;

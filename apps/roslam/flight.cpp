@@ -188,7 +188,9 @@ Flight fly(const FlightArguments& arguments, Options options, const std::string&
   if (log) attempt([&] { log->finish(); });
   if (restored) attempt([&] { end_restoration(flight, *restored, folder); });
   if (log) flight.summary.removal = log->tally();
-  folder.write(*flight.slam, flight.summary, *flight.source, flight.description);
+  attempt([&] { folder.write_flight(*flight.slam); });
+  attempt([&] { flight.summary.dense = flight.slam->dense_map(); });
+  attempt([&] { folder.write(*flight.slam, flight.summary, *flight.source, flight.description); });
   if (failure) std::rethrow_exception(failure);
   if (flight.summary.failure) std::rethrow_exception(flight.summary.failure);
   require_poses(*flight.slam, flight.summary, *flight.source, arguments.source.name);

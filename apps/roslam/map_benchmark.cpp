@@ -123,9 +123,11 @@ class Measurement {
 
   // The depth of a recording may have other units than that of the people put into it.
   std::string camera_of(const std::string& source) {
-    if (source != empty_ || !settings_.depth_units) return sequence_.camera;
+    if (source != settings_.truth) return sequence_.camera;
+    const auto units = settings_.depth_units ? settings_.depth_units : depth_units_beside(settings_.truth);
+    if (!units) return sequence_.camera;
     Camera camera = load_camera(sequence_.camera);
-    camera.depth_units_per_metre = *settings_.depth_units;
+    camera.depth_units_per_metre = *units;
     const std::string file = steps_.folder("empty_camera").string() + ".yaml";
     write_file(file, camera_to_yaml(camera));
     return file;

@@ -54,6 +54,7 @@ MappedSequence measure_maps(const BenchmarkSequence& sequence, const MapBenchmar
                             const std::stop_token& stop);
 
 struct MapBenchmarkReport : BenchmarkHeader {
+  double range = 0.0;  ///< metres
   std::vector<MappedSequence> sequences;
 };
 

@@ -36,7 +36,10 @@ std::string map_benchmark_markdown(const MapBenchmarkReport& report) {
   text << "# Dense maps\n\nRO-SLAM " << report.version << " on " << report.processor << ", " << report.cores
        << " cores, one run each, deterministic mode. Maps are put into the truth's world by the poses of "
           "their runs, and compared with what is static: see `roslam evaluate map`. Missing is what the map "
-          "of the empty scene has and the other lacks.\n";
+          "of the empty scene has and the other lacks. Maps should have what lies within "
+       << fixed(report.range, 1) << " m of a frame. Simulated flights: traffic " << report.settings.traffic
+       << ", " << (report.settings.frames == 0 ? "all" : std::to_string(report.settings.frames))
+       << " frames, seed " << report.settings.seed << ".\n";
   if (report.is_interrupted) text << "\nInterrupted: what was not complete is missing.\n";
   for (const auto& sequence : report.sequences) text << section(sequence);
   return text.str();
@@ -47,6 +50,11 @@ std::string map_benchmark_json(const MapBenchmarkReport& report) {
             {"processor", report.processor},
             {"cores", report.cores},
             {"interrupted", report.is_interrupted},
+            {"range_m", report.range},
+            {"simulation",
+             {{"traffic", report.settings.traffic},
+              {"frames", report.settings.frames},
+              {"seed", report.settings.seed}}},
             {"sequences", Json::array()}};
   for (const auto& sequence : report.sequences) {
     json["sequences"].push_back(

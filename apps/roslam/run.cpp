@@ -44,7 +44,8 @@ void print_dense(const DenseMap& dense) {
               dense.voxel_size, dense.keyframes);
   if (dense.dropped > 0) std::printf(", %zu dropped", dense.dropped);
   std::printf("\n");
-  if (dense.keyframes == 0) std::printf("note: the dense map is empty: no keyframe has depth\n");
+  if (dense.surface.points.empty())
+    std::printf("note: the dense map is empty: %s\n", std::string(why_empty(dense)).c_str());
   if (dense.times_coarsened > 0)
     std::printf("note: voxels were made %d times as large, for the map to keep within dense.max_memory\n",
                 1 << dense.times_coarsened);
@@ -137,9 +138,9 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n"
       "  roslam run my_flight --camera my_camera.yaml --real-time --out live\n"
       "  roslam run another_flight --map live/map.roslam --out further\n"
-      "RUN then holds trajectory.txt and keyframes.txt (TUM format), dense.ply and dense.bt (the dense map), "
-      "map.ply,\n"
-      "map.roslam, trajectory.png and run.json.\n"
+      "RUN then holds report.html to look at, trajectory.txt and keyframes.txt (TUM format), dense.ply and "
+      "dense.bt\n"
+      "(the dense map), map.ply, map.roslam, trajectory.png and run.json.\n"
       "Ctrl-C ends the run early and writes what was computed so far (exit code 0, \"interrupted\" in "
       "run.json).");
   add_source_options(*command, arguments->flight.source);

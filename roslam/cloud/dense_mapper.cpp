@@ -77,18 +77,20 @@ bool DenseMapper::has_moved(const Fused& fused, const KeyframePlace& place, doub
 
 std::size_t DenseMapper::follow(const std::map<KeyframeId, KeyframePlace>& places, double share) {
   std::map<WorldId, BlockSet> stale;
-  std::size_t moved = 0;
-  for (auto& [id, fused] : fused_) {
+  std::vector<const std::pair<const KeyframeId, KeyframePlace>*> moved;
+  for (const auto& [id, fused] : fused_) {
     const auto place = places.find(id);
     if (place == places.end() || !has_moved(fused, place->second, share)) continue;
     const DenseView view = unpack(fused.view);
     stale[fused.place.world].merge(map_of(fused.place.world).reached(view, fused.place.T_world_camera));
-    fused.place = place->second;
-    stale[fused.place.world].merge(map_of(fused.place.world).reached(view, fused.place.T_world_camera));
-    ++moved;
+    const auto& [world, T_world_camera] = place->second;
+    stale[world].merge(map_of(world).reached(view, T_world_camera));
+    moved.push_back(&*place);
   }
+  for (const auto* place : moved) fused_.at(place->first).place = place->second;
   for (const auto& [world, blocks] : stale) fuse_again(world, blocks);
-  return moved;
+  limit_memory();
+  return moved.size();
 }
 
 void DenseMapper::fuse_again(WorldId world, const BlockSet& blocks) {

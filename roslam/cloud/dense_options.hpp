@@ -16,7 +16,7 @@ struct DenseOptions {
   double follow = 0.5;        ///< voxels that a view must have moved by to be fused anew
   int follow_every = 10;      ///< keyframes, how often it is looked in flight what has moved
   int max_memory = 256;       ///< MB that voxels may take; a map that needs more becomes coarser
-  int queue = 50;             ///< keyframes that may wait in real-time mode; older ones are dropped
+  int queue = 20;             ///< keyframes that may wait in real-time mode; older ones are dropped
   bool keep_movable = false;  ///< keep surfaces that most labels take for something that may move
 
   /// Throws OptionsError naming the field.

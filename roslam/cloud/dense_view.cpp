@@ -87,7 +87,8 @@ DenseView ViewReducer::reduce(const cv::Mat& colour, const cv::Mat& depth, const
   cv::Mat kept = cv::Mat::zeros(colour.size(), CV_32FC1);
   if (!depth.empty()) depth.copyTo(kept, clear_of_edges(depth, depth_));
   cv::Mat beyond;
-  if (!depth.empty()) beyond = depth > depth_.max_depth;
+  // A single far reading may be a false one: all around it have to be far too.
+  if (!depth.empty()) cv::erode(depth > depth_.max_depth, beyond, cv::Mat());
   if (!hidden.empty()) kept.setTo(0, hidden);
   if (!hidden.empty() && !beyond.empty()) beyond.setTo(0, hidden);
   DenseView view;

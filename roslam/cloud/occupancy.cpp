@@ -245,8 +245,8 @@ Occupancy Occupancy::read(const std::filesystem::path& file) {
 }
 
 double usual_resolution(double spacing) {
-  constexpr double kLeast = 0.05;  // metres
-  return std::max(kLeast, 2.0 * spacing);
+  constexpr double kLeast = 0.05, kMost = 10.0;  // metres
+  return std::clamp(2.0 * spacing, kLeast, kMost);
 }
 
 Occupancy occupancy_of(const DenseMapper& mapper, WorldId world, const Surface& surface, double resolution) {

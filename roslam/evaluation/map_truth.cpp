@@ -88,6 +88,7 @@ void MapTruth::add(const MapTruthFrame& frame) {
       const float taken = frame.taken_depth.empty() ? 0.0F : frame.taken_depth.at<float>(y, x);
       if (!(taken > 0.0F) || taken >= static_cast<float>(options_.moving_range)) continue;
       if (behind > 0.0F && behind - taken <= gap) continue;
+      if (!frame.moving && !(behind > 0.0F)) continue;  // not known, rather than empty
       const bool rests = frame.moving && is_set(frame.moving->at_rest, y, x);
       // Noise of far depth alone can make a wall come nearer by more than the gap.
       if (frame.moving && !rests && !is_set(frame.moving->actors, y, x)) continue;

@@ -1,20 +1,31 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/pipeline/dense_worker.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <exception>
 #include <utility>
 
+#include "roslam/error.hpp"
 #include "roslam/geometry/motion.hpp"
 #include "roslam/geometry/stopwatch.hpp"
 #include "roslam/pipeline/thread_priority.hpp"
 #include "roslam/restoration/view.hpp"
+#include "roslam/semantics/label_set.hpp"
 
 namespace roslam {
 
 namespace {
-constexpr int kRemovedStride = 6;   // pixels between two points of what was removed
-constexpr double kInTheEnd = 0.25;  // of the distance that keyframes are followed from in flight
+constexpr int kRemovedStride = 6;      // pixels between two points of what was removed, at least
+constexpr double kMostRemoved = 2000;  // points of a keyframe
+constexpr double kInTheEnd = 0.25;     // of the distance that keyframes are followed from in flight
 }  // namespace
+
+std::string_view why_empty(const DenseMap& map) {
+  if (map.keyframes > 0) return "nothing within dense.max_depth was seen often enough";
+  if (map.dropped > 0 || !map.faults.empty()) return "all keyframes were dropped or failed";
+  return "no keyframe has depth within dense.max_depth";
+}
 
 DenseWorker::DenseWorker(const Camera& camera, const Options& options, Mode mode, PlacesOf places_of)
     : options_(options.dense),
@@ -43,7 +54,7 @@ void DenseWorker::restored(KeyframeId keyframe, const RestoredView* view) {
     job.input = std::move(found->second);
     unrestored_.erase(found);
   }
-  if (view != nullptr) job.restored = *view;
+  if (view != nullptr) job.restored = {view->colour, view->depth, view->provenance, {}, {}};
   queue(keyframe, std::move(job));
 }
 
@@ -89,7 +100,15 @@ void DenseWorker::fuse(KeyframeId keyframe, const Job& job) {
   DenseView view = restored != nullptr
                        ? reducer_.reduce(restored->colour, restored->depth, {}, restored->provenance, {})
                        : reducer_.reduce(frame.colour, frame.depth, {}, {}, hidden);
-  if (!job.input.labels.empty()) reducer_.label(view, job.input.labels, job.input.T_labelled_camera);
+  if (!job.input.labels.empty()) {
+    cv::Mat labels = job.input.labels;
+    // What could move may since have left, and would give its class to what is behind it.
+    if (job.input.has_older_labels) {
+      labels = labels.clone();
+      labels.setTo(kVoid, movable_mask(labels));
+    }
+    reducer_.label(view, labels, job.input.T_labelled_camera);
+  }
   mapper_.insert(keyframe, view, places_of_({keyframe}).front());
   if (!hidden.empty() && !frame.depth.empty()) removed_[keyframe] = removed_points(frame, hidden);
 }
@@ -98,8 +117,9 @@ std::vector<DenseWorker::RemovedPoint> DenseWorker::removed_points(const Frame& 
                                                                    const cv::Mat& hidden) const {
   std::vector<RemovedPoint> result;
   const cv::Mat is_clear = clear_of_edges(frame.depth, depth_);
-  for (int y = 0; y < hidden.rows; y += kRemovedStride) {
-    for (int x = 0; x < hidden.cols; x += kRemovedStride) {
+  const int stride = std::max(kRemovedStride, cvCeil(std::sqrt(cv::countNonZero(hidden) / kMostRemoved)));
+  for (int y = 0; y < hidden.rows; y += stride) {
+    for (int x = 0; x < hidden.cols; x += stride) {
       const float depth = frame.depth.at<float>(y, x);
       if (hidden.at<std::uint8_t>(y, x) == 0 || is_clear.at<std::uint8_t>(y, x) == 0) continue;
       if (depth > static_cast<float>(options_.max_depth)) continue;
@@ -127,13 +147,20 @@ void DenseWorker::drain() {
   follow(kInTheEnd);
 }
 
+// A map that reaches too far for the cells is a map all the same.
+void DenseWorker::add_occupancy(WorldId world, DenseMap& map) const {
+  if (map.surface.points.empty()) return;
+  try {
+    map.occupancy = std::make_shared<const Occupancy>(
+        occupancy_of(mapper_, world, map.surface, usual_resolution(mapper_.voxel_size())));
+  } catch (const OptionsError& error) {
+    ++map.faults[std::string("no dense.bt: ") + error.what()];
+  }
+}
+
 DenseMap DenseWorker::result(WorldId world) const {
   DenseMap map;
   map.surface = mapper_.surface(world);
-  if (!map.surface.points.empty()) {
-    map.occupancy = std::make_shared<const Occupancy>(
-        occupancy_of(mapper_, world, map.surface, usual_resolution(mapper_.voxel_size())));
-  }
   map.voxel_size = mapper_.voxel_size();
   map.times_coarsened = mapper_.times_coarsened();
   map.keyframes = mapper_.keyframes().size();
@@ -148,9 +175,12 @@ DenseMap DenseWorker::result(WorldId world) const {
     for (const RemovedPoint& point : removed_.at(id))
       map.removed.push_back({world_from_camera * point.position, Eigen::Vector3f::Zero(), point.colour});
   }
-  const std::scoped_lock lock(mutex_);
-  map.dropped = dropped_;
-  map.faults = faults_;
+  {
+    const std::scoped_lock lock(mutex_);
+    map.dropped = dropped_;
+    map.faults = faults_;
+  }
+  add_occupancy(world, map);
   return map;
 }
 

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "roslam/cloud/dense_mapper.hpp"
@@ -28,9 +29,10 @@ namespace roslam {
 struct DenseKeyframe {
   Frame frame;  ///< as taken; its images must not be changed afterwards
   Removal removal;
-  cv::Mat labels;            ///< of this frame or an earlier one, CV_8UC1; empty: none are known
-  SE3 T_labelled_camera;     ///< where the camera was to where it was when the labels were taken
-  bool is_restored = false;  ///< comes in two parts: the second is what restored() tells of it
+  cv::Mat labels;                 ///< of this frame or an earlier one, CV_8UC1; empty: none are known
+  SE3 T_labelled_camera;          ///< where the camera was to where it was when the labels were taken
+  bool has_older_labels = false;  ///< the labels are of an earlier frame
+  bool is_restored = false;       ///< comes in two parts: the second is what restored() tells of it
 };
 
 /// The dense map of a flight and what it took.
@@ -46,6 +48,9 @@ struct DenseMap {
   std::size_t voxel_bytes = 0, view_bytes = 0;
   std::map<std::string, std::size_t> faults;  ///< what cost keyframes, in words
 };
+
+/// Why a map without surfaces has none, in words.
+std::string_view why_empty(const DenseMap& map);
 
 /// Fuses keyframes into a dense map as they come, on a thread of its own: the tracker never waits, and what
 /// goes wrong costs a keyframe and nothing else. In deterministic mode each is fused at once.
@@ -85,6 +90,7 @@ class DenseWorker {
   std::vector<RemovedPoint> removed_points(const Frame& frame, const cv::Mat& hidden) const;
   std::map<KeyframeId, KeyframePlace> places(const std::vector<KeyframeId>& ids) const;
   void follow(double share);
+  void add_occupancy(WorldId world, DenseMap& map) const;
 
   DenseOptions options_;
   DepthOptions depth_;

@@ -113,9 +113,8 @@ class Runner {
 
   RunSummary finish() {
     attempt([&] { slam_.finish(); });
-    attempt([&] { summary_.dense = slam_.dense_map(); });
     summary_.wall_seconds = seconds_since(start_);
-    return summary_;
+    return std::move(summary_);
   }
 
  private:

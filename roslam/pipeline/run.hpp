@@ -22,7 +22,7 @@ struct RunSummary {
   double first_pose_seconds = -1.0;  ///< from the first read to the first pose; negative = no pose
   double start_up_seconds = -1.0;  ///< from the start of the process to the first pose; negative = not known
   std::optional<RemovalTally> removal;  ///< what was removed, where a RemovalLog was kept
-  std::optional<DenseMap> dense;        ///< where a dense map was made
+  std::optional<DenseMap> dense;        ///< what Slam::dense_map() gave, where it was asked
   Trajectory truth;                     ///< true poses of the frames, where the source knows them
 };
 

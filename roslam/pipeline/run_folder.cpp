@@ -14,16 +14,22 @@
 
 namespace roslam {
 
-namespace {
-enum class Result { kWritten, kRemoved, kKept };
+using Path = std::filesystem::path;
+
+enum class RunFolder::Result { kWritten, kRemoved, kKept };
 
 // What becomes of a file of the run folder.
-struct Output {
+struct RunFolder::Output {
   const char* file;
-  std::function<void(const std::filesystem::path&)> write;
+  std::function<void(const Path&)> write;
   Result result = Result::kWritten;
 };
 
+RunFolder::Result RunFolder::if_any(bool is_any, Result otherwise) {
+  return is_any ? Result::kWritten : otherwise;
+}
+
+namespace {
 // The result of an earlier run must not pass for one of this run.
 void remove_old(const std::filesystem::path& file) {
   std::error_code error;
@@ -32,7 +38,9 @@ void remove_old(const std::filesystem::path& file) {
     throw OutputError(file.string() + ": left by an earlier run and cannot be removed; choose another --out");
 }
 
-void write_one(const Output& output, const std::filesystem::path& file) {
+}  // namespace
+
+void RunFolder::write_one(const Output& output, const std::filesystem::path& file) {
   try {
     if (output.result == Result::kWritten) output.write(file);
     if (output.result == Result::kRemoved) remove_old(file);
@@ -42,7 +50,6 @@ void write_one(const Output& output, const std::filesystem::path& file) {
     throw OutputError(file.string() + ": cannot be written: " + error.what());
   }
 }
-}  // namespace
 
 RunFolder::RunFolder(const std::filesystem::path& path) : path_(path) {
   make_folder(path);
@@ -55,15 +62,22 @@ RunFolder::RunFolder(const std::filesystem::path& path) : path_(path) {
   write_file(probe, "{}\n");
 }
 
+void RunFolder::write_flight(const Slam& slam) const {
+  const bool has_new_map = slam.options().keyframes.enabled && slam.map().keyframe_count() > 0;
+  write_all({
+      {"trajectory.txt", [&](const Path& file) { write_trajectory(file, slam.trajectory()); }},
+      {"keyframes.txt", [&](const Path& file) { write_trajectory(file, slam.keyframes()); }},
+      // Perhaps the one that this flight was made in: a map is never lost for want of another.
+      {"map.roslam", [&](const Path& file) { save_map(file, slam.snapshot()); },
+       if_any(has_new_map, Result::kKept)},
+  });
+}
+
 void RunFolder::write(const Slam& slam, const RunSummary& summary, const FrameSource& source,
                       const RunDescription& description) const {
-  using Path = std::filesystem::path;
   const Trajectory trajectory = slam.trajectory();
-  const auto if_any = [](bool is_any, Result otherwise) { return is_any ? Result::kWritten : otherwise; };
-  const bool has_new_map = slam.options().keyframes.enabled && slam.map().keyframe_count() > 0;
-  const std::vector<Output> outputs{
-      {"trajectory.txt", [&](const Path& file) { write_trajectory(file, trajectory); }},
-      {"keyframes.txt", [&](const Path& file) { write_trajectory(file, slam.keyframes()); }},
+  const bool has_space = summary.dense && summary.dense->occupancy;
+  write_all({
       {"run.json",
        [&](const Path& file) { write_file(file, run_report(slam, summary, source, description)); }},
       {"groundtruth.txt", [&](const Path& file) { write_trajectory(file, summary.truth); },
@@ -72,16 +86,16 @@ void RunFolder::write(const Slam& slam, const RunSummary& summary, const FrameSo
        [&](const Path& file) { write_png(file, plot_trajectory(trajectory, "RO-SLAM", WorldUp::kZ)); },
        if_any(!trajectory.empty(), Result::kRemoved)},
       {"map.ply", [&](const Path& file) { write_map_ply(file, slam.map(), slam.main_world()); }},
-      // Perhaps the one that this flight was made in: a map is never lost for want of another.
-      {"map.roslam", [&](const Path& file) { save_map(file, slam.snapshot()); },
-       if_any(has_new_map, Result::kKept)},
       {"dense.ply", [&](const Path& file) { write_surface_ply(file, summary.dense->surface, true); },
        if_any(summary.dense.has_value(), Result::kRemoved)},
       {"dense.bt", [&](const Path& file) { summary.dense->occupancy->write(file); },
-       if_any(summary.dense && summary.dense->occupancy, Result::kRemoved)},
+       if_any(has_space, Result::kRemoved)},
       {"report.html",
-       [&](const Path& file) { write_file(file, run_page(slam, summary, description, path_)); }},
-  };
+       [&](const Path& file) { replace_file(file, run_page(slam, summary, description, path_)); }},
+  });
+}
+
+void RunFolder::write_all(const std::vector<Output>& outputs) const {
   std::exception_ptr first_failure;
   for (const auto& output : outputs) {
     try {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "roslam/pipeline/run.hpp"
 #include "roslam/pipeline/slam.hpp"
@@ -39,14 +40,24 @@ class RunFolder {
   /// or if the folder is a dataset.
   explicit RunFolder(const std::filesystem::path& path);
 
-  /// Writes all results, also those of a run that was interrupted or failed. What cannot be written does not
-  /// keep the others from being written; the first failure is thrown as OutputError at the end.
+  /// Writes trajectory, keyframes and map, which nobody can do again: before what takes longer. Throws as
+  /// write() does.
+  void write_flight(const Slam& slam) const;
+
+  /// Writes all other results, also those of a run that was interrupted or failed. What cannot be written
+  /// does not keep the others from being written; the first failure is thrown as OutputError at the end.
   void write(const Slam& slam, const RunSummary& summary, const FrameSource& source,
              const RunDescription& description) const;
 
   const std::filesystem::path& path() const { return path_; }
 
  private:
+  enum class Result;
+  struct Output;
+  static Result if_any(bool is_any, Result otherwise);
+  static void write_one(const Output& output, const std::filesystem::path& file);
+  void write_all(const std::vector<Output>& outputs) const;
+
   std::filesystem::path path_;
 };
 

@@ -125,7 +125,8 @@ class RunPage {
 
   void add_dense(const DenseMap& dense) {
     page_.add_heading("Dense map");
-    if (dense.surface.points.empty()) return page_.add_text("It is empty: no keyframe has depth.");
+    if (dense.surface.points.empty())
+      return page_.add_text("It is empty: " + std::string(why_empty(dense)) + ".");
     auto points = count_by_provenance(dense.surface);
     const std::size_t all = dense.surface.points.size();
     const auto row = [&](const char* name, Provenance provenance) {

@@ -215,11 +215,13 @@ Removal Slam::find_movables(const Frame& frame, const cv::Mat& grey) {
   const auto every = static_cast<std::size_t>(options_.removal.label_every);
   if (mode_ == Mode::kRealTime || frames() % every == 0) segmentation_.offer(frame.index, frame.colour);
   const auto labels = segmentation_.take();
-  if (labels && labels->segmentation.labels.size() == frame.colour.size()) {
+  Removal removal = removal_.find(frame, grey, predicted, labels);
+  // Labels that removal did not believe are not for the dense map either.
+  if (labels && removal.label_age == static_cast<int>(frame.index - labels->index)) {
     labelled_index_ = labels->index;
     labels_ = labels->segmentation.labels;
   }
-  return removal_.find(frame, grey, predicted, labels);
+  return removal;
 }
 
 std::shared_ptr<const ObservedFrame> Slam::extract(const Frame& frame, const cv::Mat& grey,

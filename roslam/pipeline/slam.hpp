@@ -78,6 +78,7 @@ class Slam {
 
   /// Tracks a frame and, if it becomes a keyframe, maps it (in real-time mode: on another thread). mask:
   /// empty, or CV_8UC1 of the frame's size, nonzero where nothing may be used, beside what is found to move.
+  /// The images of the frame must not be changed afterwards: keyframes are worked on later.
   /// Frames that cannot be used (wrong size or type, time not increasing) give nothing and are counted.
   /// Throws OptionsError if there is no map and keyframes.enabled is false.
   std::optional<FrameResult> process(const Frame& frame, const cv::Mat& mask = {});

@@ -35,9 +35,13 @@ std::vector<KeyframePlace> Slam::places_of(const std::vector<KeyframeId>& keyfra
 // To those who make pictures and dense maps of keyframes.
 void Slam::hand_out(KeyframeId keyframe, const Frame& frame, const Removal& removal) {
   if (dense_) {
-    DenseKeyframe input{frame, removal, {}, {}, restoration_.has_value()};
+    DenseKeyframe input;
+    input.frame = frame;
+    input.removal = removal;
+    input.is_restored = restoration_ && options_.dense.restore && options_.dense.remove;
     if (const auto T_labelled_camera = labelled_from(keyframe)) {
       input.labels = labels_;
+      input.has_older_labels = labelled_index_ != frame.index;
       input.T_labelled_camera = *T_labelled_camera;
     }
     dense_->submit(keyframe, std::move(input));
@@ -45,12 +49,15 @@ void Slam::hand_out(KeyframeId keyframe, const Frame& frame, const Removal& remo
   if (restoration_) restoration_->submit(keyframe, frame, removal);
 }
 
-// Where a keyframe was, as seen from the frame that was labelled last. Nothing if that is not known.
+// Where a keyframe was, as seen from the frame that was labelled last. Nothing if that is not known or too
+// long ago.
 std::optional<SE3> Slam::labelled_from(KeyframeId keyframe) {
   const auto labelled = std::find_if(records_.rbegin(), records_.rend(),
                                      [&](const Record& record) { return record.index <= labelled_index_; });
+  constexpr double kLastFor = 1.0;  // seconds
   const bool is_known = !labels_.empty() && labelled != records_.rend() &&
-                        labelled->index == labelled_index_ && labelled->reference.is_valid();
+                        labelled->index == labelled_index_ && labelled->reference.is_valid() &&
+                        records_.back().timestamp - labelled->timestamp <= kLastFor;
   if (!is_known) return std::nullopt;
   const std::scoped_lock lock(map_mutex_);
   if (map_.world_of(labelled->reference) != map_.world_of(keyframe)) return std::nullopt;
