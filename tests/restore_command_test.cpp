@@ -289,7 +289,8 @@ TEST_F(RestoreCommand, RefusesInOneLineWhatItCannotDo) {
   expect_refused(roslam("restore gone --out x"), {"elsewhere", "not there"});
   EXPECT_EQ(roslam("restore run").code, 2);
   EXPECT_EQ(roslam("restore run --out x --camera simulated").code, 2);
-  EXPECT_EQ(roslam("run walk --camera walk/camera.yaml --out x --models y").code, 2);
+  EXPECT_EQ(roslam("run walk --camera walk/camera.yaml --out x --models y --no-dense").code, 2);
+  EXPECT_EQ(roslam("run walk --camera walk/camera.yaml --out x --models y --dynamic none").code, 2);
   EXPECT_EQ(roslam("run walk --camera walk/camera.yaml --out x --restore --dynamic none").code, 2);
   EXPECT_EQ(roslam("restore run --out x --method magic").code, 2);
 }

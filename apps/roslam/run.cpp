@@ -94,9 +94,11 @@ void check(const FlightArguments& arguments, const Options& options) {
   if (!arguments.vocabulary.empty() && !options.loop.enabled) {
     throw CLI::ValidationError("--vocabulary", "needs loop.enabled");
   }
-  const bool restores = arguments.restore || (options.dense.enabled && options.dense.restore);
+  const bool restores = (arguments.restore || (options.dense.enabled && options.dense.restore)) &&
+                        options.removal.is_on() && options.keyframes.enabled;
   if (!arguments.models.empty() && !restores)
-    throw CLI::ValidationError("--models", "needs --restore or a dense map with dense.restore");
+    throw CLI::ValidationError(
+        "--models", "needs keyframes that are restored: --restore or a dense map, and what moves removed");
   if (arguments.restore && !options.keyframes.enabled)
     throw CLI::ValidationError("--restore", "restores keyframes, of which --localise-only makes none");
   if (arguments.restore && !options.removal.is_on())
