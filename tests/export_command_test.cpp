@@ -86,6 +86,35 @@ class Export : public testing::Test {
   const fs::path folder = scratch_path();
 };
 
+// The Point Cloud Library reads what is written, all of it.
+TEST_F(Export, IsReadByThePointCloudLibrary) {
+  if (shell_in(folder, "command -v pcl_ply2pcd pcl_convert_pcd_ascii_binary").code != 0)
+    GTEST_SKIP() << "pcl-tools are not installed";
+  ASSERT_EQ(export_map("run --pcd points.pcd --mesh mesh.ply").code, 0);
+  ASSERT_EQ(shell_in(folder, "pcl_ply2pcd mesh.ply from_ply.pcd").code, 0);
+  for (const char* file : {"points.pcd", "from_ply.pcd"}) {
+    ASSERT_EQ(shell_in(folder, std::string("pcl_convert_pcd_ascii_binary ") + file + " ascii.pcd 0").code, 0);
+    std::istringstream text(content(folder / "ascii.pcd"));
+    std::string line;
+    std::vector<std::string> fields;
+    while (std::getline(text, line) && !line.starts_with("DATA")) {
+      if (!line.starts_with("FIELDS")) continue;
+      std::istringstream names(line.substr(7));
+      for (std::string name; names >> name;) fields.push_back(name);
+    }
+    for (const SurfacePoint& point : square().points) {
+      std::map<std::string, double> values;
+      for (const std::string& field : fields) text >> values[field];
+      ASSERT_TRUE(text) << file;
+      EXPECT_NEAR(values["x"], point.position.x(), 1e-5) << file;
+      EXPECT_NEAR(values["y"], point.position.y(), 1e-5) << file;
+      EXPECT_NEAR(values["normal_z"], 1.0, 1e-6) << file;
+      EXPECT_EQ(values["label"], point.label) << file;
+      EXPECT_EQ(values["provenance"], static_cast<double>(point.provenance)) << file;
+    }
+  }
+}
+
 TEST_F(Export, WritesPointsAndMeshAsPly) {
   const Surface surface = square();
   const Outcome outcome = export_map("run --ply points.ply --mesh mesh.ply");
