@@ -18,7 +18,7 @@ DenseMapper mapped(RenderedFlight& flight, const ViewReducer& reducer, std::size
   DenseMapper mapper({}, {});
   for (std::size_t i = 0; i < count; ++i) {
     const Frame& frame = flight.frames()[i];
-    mapper.insert({static_cast<std::uint32_t>(i)}, reducer.reduce(frame.colour, frame.depth, {}, {}, {}),
+    mapper.insert({static_cast<std::uint32_t>(i)}, reducer.reduce(frame.colour, frame.depth, {}, {}),
                   {WorldId{0}, *frame.T_world_camera});
   }
   return mapper;
@@ -32,7 +32,7 @@ void fuse(benchmark::State& state, RenderedFlight& flight) {
   const Frame& frame = flight.frames()[count];
   std::uint32_t id = kKeyframes;
   for (auto _ : state) {
-    mapper.insert({id++}, reducer.reduce(frame.colour, frame.depth, {}, {}, {}),
+    mapper.insert({id++}, reducer.reduce(frame.colour, frame.depth, {}, {}),
                   {WorldId{0}, *frame.T_world_camera});
     benchmark::DoNotOptimize(mapper.voxel_bytes());
   }

@@ -184,7 +184,7 @@ TEST(ViewReducer, TakesTheLensAway) {
       depth.at<float>(y, x) = static_cast<float>(2.0 + 0.001 * camera.undistort({x, y}).x());
   const cv::Mat colour = cv::Mat::zeros(depth.size(), CV_8UC3);
   const DenseOptions options = cloud_scene::options();
-  const DenseView view = ViewReducer(camera, options, {}).reduce(colour, depth, {}, {}, {});
+  const DenseView view = ViewReducer(camera, options, {}).reduce(colour, depth, {}, {});
   EXPECT_FALSE(view.camera.has_distortion());
   for (int y = 10; y < view.depth.rows - 10; y += 20)
     for (int x = 10; x < view.depth.cols - 10; x += 20)
@@ -198,8 +198,8 @@ TEST(ViewReducer, KnowsWhatLiesBeyondItsReach) {
   const auto picture = cloud_scene::show({kWall, kFloor}, SE3(), walk.camera);  // the wall is 4 m away
   cv::Mat hidden = cv::Mat::zeros(picture.depth.size(), CV_8UC1);
   hidden.colRange(0, 40).setTo(255);
-  const DenseView view = unpack(
-      pack(ViewReducer(walk.camera, options, {}).reduce(picture.colour, picture.depth, {}, {}, hidden)));
+  const DenseView view =
+      unpack(pack(ViewReducer(walk.camera, options, {}).reduce(picture.colour, picture.depth, {}, hidden)));
   EXPECT_EQ(view.reach, 3.5);
   EXPECT_EQ(view.beyond.at<std::uint8_t>(10, 60), 255);
   EXPECT_EQ(view.depth.at<float>(10, 60), 0.0F);
@@ -212,8 +212,8 @@ TEST(ViewReducer, HidesWhatIsHidden) {
   const auto picture = cloud_scene::show({kWall}, SE3(), walk.camera);
   cv::Mat hidden = cv::Mat::zeros(picture.depth.size(), CV_8UC1);
   hidden(cv::Rect(100, 100, 50, 40)).setTo(255);
-  const DenseView view = ViewReducer(walk.camera, cloud_scene::options(), {})
-                             .reduce(picture.colour, picture.depth, {}, {}, hidden);
+  const DenseView view =
+      ViewReducer(walk.camera, cloud_scene::options(), {}).reduce(picture.colour, picture.depth, {}, hidden);
   EXPECT_EQ(cv::countNonZero(view.depth), static_cast<int>(view.depth.total()) - 25 * 20);
 }
 

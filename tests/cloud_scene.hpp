@@ -67,7 +67,7 @@ inline DenseOptions options() {
 inline DenseView view(const Picture& picture, const Camera& camera, const DenseOptions& dense = options(),
                       Provenance provenance = Provenance::kMeasured) {
   const cv::Mat from(picture.colour.size(), CV_8UC1, cv::Scalar(static_cast<double>(provenance)));
-  return ViewReducer(camera, dense, {}).reduce(picture.colour, picture.depth, {}, from, {});
+  return ViewReducer(camera, dense, {}).reduce(picture.colour, picture.depth, from, {});
 }
 
 /// Poses along the x axis, a little turned.

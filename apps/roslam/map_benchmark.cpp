@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/map_benchmark.hpp"
 
+#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -29,9 +30,12 @@ struct Variant {
   const char* step;
 };
 
-constexpr Variant kAsTaken{kMapAsTaken, "as_taken"}, kRemoved{kMapRemoved, "removed"},
-    kReprojected{kMapReprojected, "reprojected"}, kRestored{kMapRestored, "all"},
-    kEmptyScene{kMapEmptyScene, "empty"};
+// In the order of the report; the last is of another flight.
+constexpr std::array kVariants{Variant{kMapAsTaken, "as_taken"}, Variant{kMapRemoved, "removed"},
+                               Variant{kMapReprojected, "reprojected"}, Variant{kMapRestored, "all"},
+                               Variant{kMapEmptyScene, "empty"}};
+constexpr const Variant& kRestored = kVariants[3];
+constexpr const Variant& kEmptyScene = kVariants[4];
 
 // What makes the maps differ; the trajectory does not depend on it.
 Options options_for(const Variant& variant, const std::string& config) {
@@ -59,9 +63,8 @@ class Measurement {
     result.sequence = sequence_;
     try {
       prepare();
-      for (const Variant& variant : {kAsTaken, kRemoved, kReprojected, kRestored})
-        map(variant, sequence_.source);
-      map(kEmptyScene, empty_);
+      for (const Variant& variant : kVariants)
+        map(variant, &variant == &kEmptyScene ? empty_ : sequence_.source);
       read_costs(result);
       result.maps = evaluate();
       result.figure = draw();
@@ -147,7 +150,7 @@ class Measurement {
     evaluation.truth = truth_;
     evaluation.truth_options.range = settings_.range;
     evaluation.truth_options.far_range = std::max(evaluation.truth_options.far_range, settings_.range);
-    for (const Variant& variant : {kAsTaken, kRemoved, kReprojected, kRestored, kEmptyScene})
+    for (const Variant& variant : kVariants)
       evaluation.estimates.push_back({variant.name, steps_.folder(variant.step)});
     evaluation.reference = steps_.folder(kEmptyScene.step);
     evaluation.quiet = settings_.common.quiet;
@@ -157,7 +160,7 @@ class Measurement {
   // The maps from the front and, below, from above.
   std::string draw() const {
     std::vector<cv::Mat> front, top;
-    for (const Variant& variant : {kAsTaken, kRemoved, kReprojected, kRestored, kEmptyScene}) {
+    for (const Variant& variant : kVariants) {
       const fs::path run = steps_.folder(variant.step);
       const Surface surface = read_surface_ply(run / "dense.ply");
       const Trajectory flight = read_trajectory(run / "trajectory.txt").trajectory;

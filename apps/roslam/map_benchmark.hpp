@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/roslam/benchmark_measure.hpp"
+#include "apps/roslam/truth_benchmark.hpp"
 #include "roslam/evaluation/map_error.hpp"
 
 namespace roslam::app {
@@ -40,11 +40,8 @@ struct MappedSequence {
   double filled_share() const;
 };
 
-struct MapBenchmarkSettings {
-  BenchmarkArguments common;
-  double range = 8.0;                 ///< metres, as of `roslam evaluate map`
-  std::string truth;                  ///< the frames of the only sequence without what moves
-  std::optional<double> depth_units;  ///< a metre, of their depth
+struct MapBenchmarkSettings : TruthBenchmarkSettings {
+  double range = 8.0;  ///< metres, as of `roslam evaluate map`
 };
 
 /// Maps a sequence as taken, with things removed, with what other views show and with all, and the same

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/roslam/benchmark_measure.hpp"
+#include "apps/roslam/truth_benchmark.hpp"
 #include "roslam/evaluation/restoration_error.hpp"
 
 namespace roslam::app {
@@ -28,12 +28,9 @@ struct RestoredSequence {
   std::string figure;  ///< file relative to the benchmark's folder; empty if there is none
 };
 
-struct RestorationBenchmarkSettings {
-  BenchmarkArguments common;
+struct RestorationBenchmarkSettings : TruthBenchmarkSettings {
   std::vector<std::string> methods{"telea", "navier-stokes", "reprojection", "gan", "both"};
-  std::size_t every = 3;              ///< one frame in so many is restored
-  std::string truth;                  ///< of the only sequence, where it is not beside it
-  std::optional<double> depth_units;  ///< a metre, of the true depth
+  std::size_t every = 3;  ///< one frame in so many is restored
 };
 
 /// Flies through a sequence, restores it by each method and compares with the truth. A simulated flight is

@@ -82,8 +82,8 @@ ViewReducer::ViewReducer(const Camera& camera, const DenseOptions& dense, const 
   }
 }
 
-DenseView ViewReducer::reduce(const cv::Mat& colour, const cv::Mat& depth, const cv::Mat& labels,
-                              const cv::Mat& provenance, const cv::Mat& hidden) const {
+DenseView ViewReducer::reduce(const cv::Mat& colour, const cv::Mat& depth, const cv::Mat& provenance,
+                              const cv::Mat& hidden) const {
   cv::Mat kept = cv::Mat::zeros(colour.size(), CV_32FC1);
   if (!depth.empty()) depth.copyTo(kept, clear_of_edges(depth, depth_));
   cv::Mat beyond;
@@ -101,12 +101,11 @@ DenseView ViewReducer::reduce(const cv::Mat& colour, const cv::Mat& depth, const
   };
   cv::remap(colour, view.colour, map_x_, map_y_, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   view.depth = nearest(kept, 0.0);
-  view.labels = nearest(labels, kVoid);
+  view.labels = cv::Mat(view.depth.size(), CV_8UC1, cv::Scalar(kVoid));
   view.provenance = nearest(provenance, static_cast<double>(Provenance::kMeasured));
   view.beyond = nearest(beyond, 0.0);
   view.beyond.setTo(0, view.provenance != static_cast<double>(Provenance::kMeasured));
   view.reach = depth_.max_depth;
-  view.labels.setTo(kVoid, view.provenance != static_cast<double>(Provenance::kMeasured));
   return view;
 }
 

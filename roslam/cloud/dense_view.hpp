@@ -43,15 +43,18 @@ class ViewReducer {
  public:
   ViewReducer(const Camera& camera, const DenseOptions& dense, const DepthOptions& depth);
 
-  /// colour: CV_8UC3; depth: CV_32FC1 metres, 0 or NaN = unknown, may be empty; labels: CV_8UC1 of what the
-  /// camera saw, may be empty; provenance: CV_8UC1, may be empty, which is all measured; hidden: CV_8UC1,
-  /// nonzero where nothing is to be fused, may be empty. All of the camera's size.
-  DenseView reduce(const cv::Mat& colour, const cv::Mat& depth, const cv::Mat& labels,
-                   const cv::Mat& provenance, const cv::Mat& hidden) const;
+  /// Without labels. colour: CV_8UC3; depth: CV_32FC1 metres, 0 or NaN = unknown, may be empty; provenance:
+  /// CV_8UC1, may be empty, which is all measured; hidden: CV_8UC1, nonzero where nothing is to be fused, may
+  /// be empty. All of the camera's size.
+  DenseView reduce(const cv::Mat& colour, const cv::Mat& depth, const cv::Mat& provenance,
+                   const cv::Mat& hidden) const;
 
   /// Labels what was measured by a picture taken elsewhere. labels: CV_8UC1 of the camera's size.
   /// T_labelled_camera: from where the view was taken to where the labelled picture was.
   void label(DenseView& view, const cv::Mat& labels, const SE3& T_labelled_camera) const;
+
+  /// Of the pictures as taken.
+  const PixelRays& rays() const { return rays_; }
 
  private:
   DepthOptions depth_;

@@ -16,11 +16,6 @@ struct Row {
   std::function<std::string(const EvaluatedMap&)> value;
 };
 
-std::string percent(double value, int decimals = 1) {
-  const std::string text = fixed(100.0 * value, decimals);
-  return text == "-" ? text : text + " %";
-}
-
 std::string with_unit(double value, int decimals, const char* unit) {
   const std::string text = fixed(value, decimals);
   return text == "-" ? text : text + " " + unit;
@@ -31,17 +26,17 @@ std::string millimetres(double metres) { return with_unit(1000.0 * metres, 0, "m
 std::vector<Row> rows() {
   return {
       {"points", [](const EvaluatedMap& m) { return std::to_string(m.error.points); }},
-      {"accuracy", [](const EvaluatedMap& m) { return percent(m.error.accuracy); }},
-      {"completeness", [](const EvaluatedMap& m) { return percent(m.error.completeness); }},
-      {"F-score", [](const EvaluatedMap& m) { return percent(m.error.f_score); }},
-      {"ghosts", [](const EvaluatedMap& m) { return percent(m.error.ghosts, 3); }},
-      {"holes", [](const EvaluatedMap& m) { return percent(m.error.holes); }},
+      {"accuracy", [](const EvaluatedMap& m) { return percentage(m.error.accuracy); }},
+      {"completeness", [](const EvaluatedMap& m) { return percentage(m.error.completeness); }},
+      {"F-score", [](const EvaluatedMap& m) { return percentage(m.error.f_score); }},
+      {"ghosts", [](const EvaluatedMap& m) { return percentage(m.error.ghosts, 3); }},
+      {"holes", [](const EvaluatedMap& m) { return percentage(m.error.holes); }},
       {"missing of the reference",
-       [](const EvaluatedMap& m) { return percent(m.error.missing_of_reference); }},
+       [](const EvaluatedMap& m) { return percentage(m.error.missing_of_reference); }},
       {"distance, median", [](const EvaluatedMap& m) { return millimetres(m.error.median_distance); }},
       {"distance, 90 %", [](const EvaluatedMap& m) { return millimetres(m.error.p90_distance); }},
       {"colour error", [](const EvaluatedMap& m) { return fixed(m.error.colour_error, 1); }},
-      {"on resting things", [](const EvaluatedMap& m) { return percent(m.error.resting); }},
+      {"on resting things", [](const EvaluatedMap& m) { return percentage(m.error.resting); }},
       {"trajectory error", [](const EvaluatedMap& m) { return millimetres(m.trajectory_rmse); }},
   };
 }
@@ -102,7 +97,7 @@ std::string to_markdown(const std::vector<EvaluatedMap>& maps) {
     for (const auto& e : map.error.by_provenance) {
       if (e.points == 0) continue;
       origins.push_back({table_cell(map.name) + ", " + name_of(e.provenance), std::to_string(e.points),
-                         percent(e.accuracy), std::to_string(e.ghost_points), fixed(e.colour_error, 1)});
+                         percentage(e.accuracy), std::to_string(e.ghost_points), fixed(e.colour_error, 1)});
     }
   }
   return markdown_table(table) + "\n" + markdown_table(origins);

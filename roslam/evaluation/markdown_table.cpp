@@ -47,4 +47,9 @@ std::string markdown_table(const std::vector<TableRow>& rows) {
   return text;
 }
 
+std::string percentage(double share, int decimals) {
+  const std::string value = fixed(100.0 * share, decimals);
+  return value == "-" ? value : value + " %";
+}
+
 }  // namespace roslam

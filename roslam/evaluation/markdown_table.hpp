@@ -20,4 +20,7 @@ std::string table_cell(std::string name);
 /// So many digits after the point; "-" for what is not finite.
 std::string fixed(double value, int decimals);
 
+/// A share as "12.3 %"; "-" for what is not finite.
+std::string percentage(double share, int decimals = 1);
+
 }  // namespace roslam

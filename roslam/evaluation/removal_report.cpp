@@ -10,14 +10,9 @@ namespace roslam {
 namespace {
 using Json = nlohmann::ordered_json;
 
-std::string percent(double share) {
-  const std::string value = fixed(100.0 * share, 1);
-  return value == "-" ? value : value + " %";
-}
-
 TableRow row(const std::string& name, const PointTally& points) {
-  return {name, std::to_string(points.kept), std::to_string(points.removed), percent(points.kept_share()),
-          percent(points.removed_share())};
+  return {name, std::to_string(points.kept), std::to_string(points.removed), percentage(points.kept_share()),
+          percentage(points.removed_share())};
 }
 
 Json json_of(const PointTally& points) {
@@ -50,12 +45,12 @@ std::string to_markdown(const RemovalError& error) {
                                    row("- beyond " + near, error.beyond),
                                    row("movable things at rest", error.at_rest)};
   const std::string figures = "Of the points that the run was left with, " +
-                              percent(error.run_actor_share()) + " lie on actors. Actors cover " +
-                              percent(error.actor_share()) + " of the picture, the masks cover " +
-                              percent(error.actor_recall()) + " of the actors and " +
-                              percent(error.removed_share()) + " of the picture.";
-  return "Points on actors that survive: " + percent(error.on_actors.kept_share()) +
-         "; static points wrongly removed: " + percent(scene.removed_share()) + "; " +
+                              percentage(error.run_actor_share()) + " lie on actors. Actors cover " +
+                              percentage(error.actor_share()) + " of the picture, the masks cover " +
+                              percentage(error.actor_recall()) + " of the actors and " +
+                              percentage(error.removed_share()) + " of the picture.";
+  return "Points on actors that survive: " + percentage(error.on_actors.kept_share()) +
+         "; static points wrongly removed: " + percentage(scene.removed_share()) + "; " +
          std::to_string(error.frames) + " frames" + (error.interrupted ? ", interrupted" : "") + "\n\n" +
          markdown_table(rows) + "\n" + figures + "\n" + left_out(error);
 }

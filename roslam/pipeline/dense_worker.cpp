@@ -33,9 +33,9 @@ DenseWorker::DenseWorker(const Camera& camera, const Options& options, Mode mode
       margin_(options.restoration.margin),
       mode_(mode),
       places_of_(std::move(places_of)),
-      rays_(camera),
       reducer_(camera, options.dense, options.depth),
       mapper_(options.dense, options.noise),
+      jobs_(options.dense.queue),
       worker_([this](KeyframeId keyframe, const auto&, StageTimes& times) { work(keyframe, times); }, mode,
               1) {}
 
@@ -59,36 +59,24 @@ void DenseWorker::restored(KeyframeId keyframe, const RestoredView* view) {
 }
 
 void DenseWorker::queue(KeyframeId keyframe, Job job) {
-  {
-    const std::scoped_lock lock(mutex_);
-    waiting_.emplace(keyframe, std::move(job));
-    for (; waiting_.size() > static_cast<std::size_t>(options_.queue); ++dropped_)
-      waiting_.erase(waiting_.begin());
-  }
+  jobs_.put(keyframe, std::move(job));
   worker_.submit(keyframe);
 }
 
 void DenseWorker::work(KeyframeId keyframe, StageTimes& times) {
   if (mode_ == Mode::kRealTime) give_way_to_others();
-  Job job;
-  {
-    const std::scoped_lock lock(mutex_);
-    const auto found = waiting_.find(keyframe);
-    if (found == waiting_.end()) return;  // dropped
-    job = std::move(found->second);
-    waiting_.erase(found);
-  }
+  const auto job = jobs_.take(keyframe);
+  if (!job) return;  // dropped
   try {
     const Stopwatch watch;
-    fuse(keyframe, job);
+    fuse(keyframe, *job);
     times.add("dense.fuse", watch.seconds());
     if (++since_followed_ < static_cast<std::size_t>(options_.follow_every)) return;
     const Stopwatch follow_watch;
     follow(1.0);
     times.add("dense.follow", follow_watch.seconds());
   } catch (const std::exception& error) {
-    const std::scoped_lock lock(mutex_);
-    ++faults_[error.what()];
+    jobs_.note_fault(error);
   }
 }
 
@@ -98,8 +86,8 @@ void DenseWorker::fuse(KeyframeId keyframe, const Job& job) {
   cv::Mat hidden;
   if (options_.remove) hidden = removed_area(job.input.removal, frame.colour.size(), margin_);
   DenseView view = restored != nullptr
-                       ? reducer_.reduce(restored->colour, restored->depth, {}, restored->provenance, {})
-                       : reducer_.reduce(frame.colour, frame.depth, {}, {}, hidden);
+                       ? reducer_.reduce(restored->colour, restored->depth, restored->provenance, {})
+                       : reducer_.reduce(frame.colour, frame.depth, {}, hidden);
   if (!job.input.labels.empty()) {
     cv::Mat labels = job.input.labels;
     // What could move may since have left, and would give its class to what is behind it.
@@ -123,7 +111,7 @@ std::vector<DenseWorker::RemovedPoint> DenseWorker::removed_points(const Frame& 
       const float depth = frame.depth.at<float>(y, x);
       if (hidden.at<std::uint8_t>(y, x) == 0 || is_clear.at<std::uint8_t>(y, x) == 0) continue;
       if (depth > static_cast<float>(options_.max_depth)) continue;
-      const Eigen::Vector3f point = rays_.point(x, y, depth);
+      const Eigen::Vector3f point = reducer_.rays().point(x, y, depth);
       if (point.allFinite()) result.push_back({point, frame.colour.at<cv::Vec3b>(y, x)});
     }
   }
@@ -175,11 +163,8 @@ DenseMap DenseWorker::result(WorldId world) const {
     for (const RemovedPoint& point : removed_.at(id))
       map.removed.push_back({world_from_camera * point.position, Eigen::Vector3f::Zero(), point.colour});
   }
-  {
-    const std::scoped_lock lock(mutex_);
-    map.dropped = dropped_;
-    map.faults = faults_;
-  }
+  map.dropped = jobs_.dropped();
+  map.faults = jobs_.faults();
   add_occupancy(world, map);
   return map;
 }

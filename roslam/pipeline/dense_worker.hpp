@@ -16,6 +16,7 @@
 #include "roslam/cloud/occupancy.hpp"
 #include "roslam/cloud/surface.hpp"
 #include "roslam/map/ids.hpp"
+#include "roslam/pipeline/keyframe_jobs.hpp"
 #include "roslam/pipeline/keyframe_worker.hpp"
 #include "roslam/pipeline/options.hpp"
 #include "roslam/pipeline/statistics.hpp"
@@ -67,8 +68,7 @@ class DenseWorker {
   /// Waits until all are fused, and lets the map follow the keyframes to where they are in the end.
   void drain();
 
-  /// The map, its surfaces and views. Only after drain().
-  const DenseMapper& mapper() const { return mapper_; }
+  /// The map by then. Only after drain().
   DenseMap result(WorldId world) const;
 
   StageTimes times() const { return worker_.times(); }
@@ -97,7 +97,6 @@ class DenseWorker {
   int margin_;  // pixels
   Mode mode_;
   PlacesOf places_of_;
-  PixelRays rays_;
   ViewReducer reducer_;
 
   // By the worker's thread.
@@ -106,11 +105,10 @@ class DenseWorker {
   std::size_t since_followed_ = 0;  // keyframes
   std::size_t moved_ = 0;
 
-  mutable std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards what follows
   std::map<KeyframeId, DenseKeyframe> unrestored_;
-  std::map<KeyframeId, Job> waiting_;
-  std::size_t dropped_ = 0;
-  std::map<std::string, std::size_t> faults_;
+
+  KeyframeJobs<Job> jobs_;
 
   KeyframeWorker worker_;  // last, so that its thread stops before what it uses goes away
 };

@@ -19,20 +19,12 @@ RestorationWorker::RestorationWorker(const Camera& camera, const Options& option
       places_of_(std::move(places_of)),
       on_restored_(std::move(on_restored)),
       on_left_(std::move(on_left)),
+      jobs_(options_.queue),
       worker_([this](KeyframeId keyframe, const auto&, StageTimes& times) { work(keyframe, times); }, mode,
               1) {}
 
 void RestorationWorker::submit(KeyframeId keyframe, const Frame& frame, const Removal& removal) {
-  std::vector<KeyframeId> dropped;
-  {
-    const std::scoped_lock lock(mutex_);
-    waiting_.emplace(keyframe, Job{frame, removal});
-    for (; waiting_.size() > static_cast<std::size_t>(options_.queue); ++dropped_) {
-      dropped.push_back(waiting_.begin()->first);
-      waiting_.erase(waiting_.begin());
-    }
-  }
-  for (const KeyframeId id : dropped) leave(id);
+  for (const KeyframeId dropped : jobs_.put(keyframe, Job{frame, removal})) leave(dropped);
   worker_.submit(keyframe);
 }
 
@@ -40,35 +32,16 @@ void RestorationWorker::leave(KeyframeId keyframe) const {
   if (on_left_) on_left_(keyframe);
 }
 
-std::size_t RestorationWorker::dropped() const {
-  const std::scoped_lock lock(mutex_);
-  return dropped_;
-}
-
-std::map<std::string, std::size_t> RestorationWorker::faults() const {
-  const std::scoped_lock lock(mutex_);
-  return faults_;
-}
-
 void RestorationWorker::work(KeyframeId keyframe, StageTimes& times) {
   if (mode_ == Mode::kRealTime) give_way_to_others();
-  Job job;
-  {
-    const std::scoped_lock lock(mutex_);
-    const auto found = waiting_.find(keyframe);
-    if (found == waiting_.end()) return;  // dropped
-    job = std::move(found->second);
-    waiting_.erase(found);
-  }
+  const auto job = jobs_.take(keyframe);
+  if (!job) return;  // dropped
   try {
     const Stopwatch watch;
-    restore(keyframe, job);
+    restore(keyframe, *job);
     times.add("restoration", watch.seconds());
   } catch (const std::exception& error) {
-    {
-      const std::scoped_lock lock(mutex_);
-      ++faults_[error.what()];
-    }
+    jobs_.note_fault(error);
     leave(keyframe);
   }
 }

@@ -5,12 +5,12 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "roslam/map/ids.hpp"
 #include "roslam/map/keyframe_place.hpp"
+#include "roslam/pipeline/keyframe_jobs.hpp"
 #include "roslam/pipeline/keyframe_worker.hpp"
 #include "roslam/pipeline/options.hpp"
 #include "roslam/pipeline/statistics.hpp"
@@ -52,10 +52,10 @@ class RestorationWorker {
   /// Waits until all that were not dropped are restored.
   void drain() { worker_.drain(); }
 
-  std::size_t dropped() const;
+  std::size_t dropped() const { return jobs_.dropped(); }
 
   /// What went wrong so far, in words, and how often.
-  std::map<std::string, std::size_t> faults() const;
+  std::map<std::string, std::size_t> faults() const { return jobs_.faults(); }
 
   StageTimes times() const { return worker_.times(); }
 
@@ -80,10 +80,7 @@ class RestorationWorker {
   OnLeft on_left_;
   std::map<KeyframeId, SourceView> sources_;  // by the worker's thread
 
-  mutable std::mutex mutex_;  // guards what follows
-  std::map<KeyframeId, Job> waiting_;
-  std::size_t dropped_ = 0;
-  std::map<std::string, std::size_t> faults_;
+  KeyframeJobs<Job> jobs_;
 
   KeyframeWorker worker_;  // last, so that its thread stops before what it uses goes away
 };

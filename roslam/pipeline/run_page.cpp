@@ -9,17 +9,14 @@
 #include "roslam/evaluation/html_page.hpp"
 #include "roslam/evaluation/trajectory_error.hpp"
 #include "roslam/evaluation/trajectory_plot.hpp"
+#include "roslam/failure.hpp"
 #include "roslam/pipeline/run_folder.hpp"
 
 namespace roslam {
 
 namespace {
-std::string percent(double part, double whole) {
-  return whole > 0.0 ? fixed(100.0 * part / whole, 1) + " %" : "-";
-}
-
 std::string percent(std::size_t part, std::size_t whole) {
-  return percent(static_cast<double>(part), static_cast<double>(whole));
+  return percentage(static_cast<double>(part) / static_cast<double>(whole));
 }
 
 std::string megabytes(std::size_t bytes) { return fixed(static_cast<double>(bytes) / 1048576.0, 0) + " MB"; }
@@ -67,16 +64,6 @@ class RunPage {
     if (summary_.failure) page_.add_text("The run ended early: " + words_of(summary_.failure));
   }
 
-  static std::string words_of(const std::exception_ptr& failure) {
-    try {
-      std::rethrow_exception(failure);
-    } catch (const std::exception& error) {
-      return error.what();
-    } catch (...) {
-      return "unknown";
-    }
-  }
-
   void add_trajectory() {
     page_.add_heading("Trajectory");
     if (trajectory_.empty()) return page_.add_text("No frame was tracked.");
@@ -108,7 +95,7 @@ class RunPage {
     if (!summary_.removal || summary_.removal->frames == 0) return;
     const RemovalTally& tally = *summary_.removal;
     page_.add_heading("What was removed");
-    page_.add_text("On average " + percent(tally.removed_area, static_cast<double>(tally.frames)) +
+    page_.add_text("On average " + percentage(tally.removed_area / static_cast<double>(tally.frames)) +
                    " of the picture.");
     std::size_t all = tally.kept_points;
     for (const auto& [kind, count] : tally.removed_points) all += count;

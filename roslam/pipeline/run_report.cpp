@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "roslam/failure.hpp"
 #include "roslam/pipeline/run_folder.hpp"
 
 namespace roslam {
@@ -60,17 +61,6 @@ Json frames_json(const Slam& slam, const RunSummary& summary, const FrameSource&
           {"skipped", skipped},
           {"without_depth", summary.without_depth},
           {"skipped_depth", counts_json(source.skipped_depth())}};
-}
-
-Json failure_json(const std::exception_ptr& failure) {
-  if (!failure) return nullptr;
-  try {
-    std::rethrow_exception(failure);
-  } catch (const std::exception& error) {
-    return error.what();
-  } catch (...) {
-    return "unknown";
-  }
 }
 
 Json times_json(const StageTimes& times) {
@@ -175,7 +165,7 @@ std::string run_report(const Slam& slam, const RunSummary& summary, const FrameS
   if (!description.flight.empty()) json["flight"] = description.flight;
   json["mode"] = slam.mode() == Mode::kDeterministic ? "deterministic" : "real-time";
   json["interrupted"] = summary.interrupted;
-  json["error"] = failure_json(summary.failure);
+  json["error"] = summary.failure ? Json(words_of(summary.failure)) : Json(nullptr);
   json["frames"] = frames_json(slam, summary, source);
   json["dynamic"] = dynamic_json(slam, summary, description);
   if (slam.restores())
