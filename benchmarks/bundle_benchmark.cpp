@@ -6,7 +6,7 @@
 namespace roslam::benchmarks {
 
 namespace {
-// 10 keyframes, 1000 points, 5000 observations: what follows a keyframe in a room.
+// 10 keyframes, 1000 points, 5000 observations: a typical local bundle adjustment indoors.
 void adjust(benchmark::State& state) {
   constexpr std::uint32_t kSeed = 3;
   std::mt19937 random(kSeed);
@@ -21,7 +21,7 @@ void adjust(benchmark::State& state) {
     benchmark::DoNotOptimize(problem.poses.data());
   }
   if (!summary.is_usable || summary.final_cost > 0.5 * summary.initial_cost) {
-    state.SkipWithError("the adjustment did not lessen the cost");
+    state.SkipWithError("bundle adjustment did not reduce the cost");
   }
   state.counters["observations"] = static_cast<double>(start.terms.size());
   state.counters["steps"] = summary.iterations;

@@ -5,58 +5,58 @@
 #include <memory>
 
 #include "benchmarks/benchmarks.hpp"
-#include "roslam/cloud/dense_mapper.hpp"
-#include "roslam/cloud/occupancy.hpp"
+#include "roslam/dense/dense_mapper.hpp"
+#include "roslam/dense/occupancy_map.hpp"
 
 namespace roslam::benchmarks {
 
 namespace {
 constexpr std::size_t kKeyframes = 20;
 
-// A map of the first keyframes of the street, at poses that are known.
-DenseMapper mapped(RenderedFlight& flight, const ViewReducer& reducer, std::size_t count) {
+// A map of the first frames of the street, fused at their true poses.
+DenseMapper mapped(RenderedFlight& flight, const DepthKeyframeReducer& reducer, std::size_t count) {
   DenseMapper mapper({}, {});
   for (std::size_t i = 0; i < count; ++i) {
     const Frame& frame = flight.frames()[i];
     mapper.insert({static_cast<std::uint32_t>(i)}, reducer.reduce(frame.colour, frame.depth, {}, {}),
-                  {WorldId{0}, *frame.T_world_camera});
+                  {SubmapId{0}, *frame.T_world_camera});
   }
   return mapper;
 }
 
-// One keyframe more, from picture to voxels.
+// Fuses one more keyframe, from image to voxels.
 void fuse(benchmark::State& state, RenderedFlight& flight) {
-  const ViewReducer reducer(flight.camera(), {}, {});
+  const DepthKeyframeReducer reducer(flight.camera(), {}, {});
   const std::size_t count = std::min(kKeyframes, flight.frames().size() - 1);
   DenseMapper mapper = mapped(flight, reducer, count);
   const Frame& frame = flight.frames()[count];
   std::uint32_t id = kKeyframes;
   for (auto _ : state) {
     mapper.insert({id++}, reducer.reduce(frame.colour, frame.depth, {}, {}),
-                  {WorldId{0}, *frame.T_world_camera});
+                  {SubmapId{0}, *frame.T_world_camera});
     benchmark::DoNotOptimize(mapper.voxel_bytes());
   }
 }
 
 void extract(benchmark::State& state, RenderedFlight& flight) {
-  const ViewReducer reducer(flight.camera(), {}, {});
+  const DepthKeyframeReducer reducer(flight.camera(), {}, {});
   const DenseMapper mapper = mapped(flight, reducer, std::min(kKeyframes, flight.frames().size()));
   std::size_t points = 0;
   for (auto _ : state) {
-    points = mapper.surface(WorldId{0}).points.size();
+    points = mapper.surface(SubmapId{0}).points.size();
     benchmark::DoNotOptimize(points);
   }
   state.counters["points"] = static_cast<double>(points);
 }
 
-// Free, occupied and unknown cells of 0.1 m.
+// Occupancy map with cells of 0.1 m.
 void occupy(benchmark::State& state, RenderedFlight& flight) {
-  const ViewReducer reducer(flight.camera(), {}, {});
+  const DepthKeyframeReducer reducer(flight.camera(), {}, {});
   const DenseMapper mapper = mapped(flight, reducer, std::min(kKeyframes, flight.frames().size()));
-  const Surface surface = mapper.surface(WorldId{0});
+  const SurfaceMap surface = mapper.surface(SubmapId{0});
   double free = 0.0;
   for (auto _ : state) {
-    free = occupancy_of(mapper, WorldId{0}, surface, 0.1).free_volume();
+    free = occupancy_map_of(mapper, SubmapId{0}, surface, 0.1).free_volume();
     benchmark::DoNotOptimize(free);
   }
   state.counters["m3_free"] = free;

@@ -11,7 +11,7 @@ namespace roslam::benchmarks {
 namespace {
 enum class Masked { kNo, kYes };
 
-// Two walking people in front of the camera hide about a fifth of the picture.
+// Two walking people in front of the camera hide about a fifth of the image.
 cv::Mat mask_of_people(const cv::Size& size) {
   cv::Mat mask = cv::Mat::zeros(size, CV_8UC1);
   for (const int x : {size.width / 4, size.width / 2}) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What each stage costs. For figures to compare, on a machine that does little else:
+// Run time of each stage. For comparable figures, on an otherwise idle machine:
 //   roslam_benchmarks --benchmark_repetitions=5 --benchmark_report_aggregates_only=true
 // and for one stage: roslam_benchmarks --benchmark_filter=pose
-// The CPU column is the one to trust; all inputs are made from fixed seeds.
+// The CPU column is the reliable one; all inputs are made from fixed seeds.
 #include <benchmark/benchmark.h>
 
 #include "benchmarks/benchmarks.hpp"

@@ -4,14 +4,14 @@
 #include <numeric>
 
 #include "benchmarks/benchmarks.hpp"
-#include "roslam/tracking/projection_matcher.hpp"
+#include "roslam/matching/projection_matcher.hpp"
 
 namespace roslam::benchmarks {
 
 namespace {
 constexpr std::uint32_t kSeed = 1;
 constexpr std::size_t kPoints = 1000;
-constexpr int kFlippedBits = 15;  // about what noise and a small turn change of a descriptor
+constexpr int kFlippedBits = 15;  // bits of a descriptor that noise and a small rotation change, about
 
 void match_by_brute_force(benchmark::State& state) {
   std::mt19937 random(kSeed);
@@ -25,7 +25,7 @@ void match_by_brute_force(benchmark::State& state) {
     matches = pairs.size();
     benchmark::DoNotOptimize(pairs.data());
   }
-  if (matches < kPoints * 9 / 10) state.SkipWithError("most points should have found themselves again");
+  if (matches < kPoints * 9 / 10) state.SkipWithError("fewer than 90 % of the points were matched");
   state.counters["matches"] = static_cast<double>(matches);
 }
 
@@ -50,7 +50,7 @@ void match_by_projection(benchmark::State& state) {
       ++matches;
     }
   }
-  if (matches < kPoints * 9 / 10) state.SkipWithError("most points should have found themselves again");
+  if (matches < kPoints * 9 / 10) state.SkipWithError("fewer than 90 % of the points were matched");
   state.counters["matches"] = static_cast<double>(matches);
 }
 }  // namespace

@@ -8,11 +8,11 @@
 namespace roslam::benchmarks {
 
 namespace {
-// From a 640x480 picture to its labels, the longer side of what the network sees being state.range(0).
+// From a 640x480 image to its labels; state.range(0) is the longer side of the network input.
 void segment(benchmark::State& state, RenderedFlight& flight, InferenceBackend backend) {
-  const auto model = shipped_segmentation_model();
+  const auto model = find_segmentation_model();
   if (model.empty()) {
-    state.SkipWithError("models/roslam-pspnet.onnx is not there");
+    state.SkipWithError("models/roslam-pspnet.onnx not found");
     return;
   }
   PspnetSegmenter segmenter(model, {static_cast<int>(state.range(0))}, backend);

@@ -2,19 +2,19 @@
 #include <benchmark/benchmark.h>
 
 #include "benchmarks/benchmarks.hpp"
-#include "roslam/pipeline/slam.hpp"
+#include "roslam/slam/slam.hpp"
 
 namespace roslam::benchmarks {
 
 namespace {
-// The flight forth and back and forth again: a steady motion of any length from a few pictures.
+// Index of a frame flown back and forth: continuous motion of any length from a few images.
 std::size_t there_and_back(std::size_t step, std::size_t frames) {
   const std::size_t period = 2 * (frames - 1);
   const std::size_t at = step % period;
   return at < frames ? at : period - at;
 }
 
-// A frame through the whole pipeline in lock-step: tracking, and mapping where it became a keyframe.
+// A frame through the whole deterministic pipeline: tracking, and mapping if it became a keyframe.
 void process(benchmark::State& state, RenderedFlight& flight) {
   const auto& frames = flight.frames();
   const Camera& camera = flight.camera();
@@ -28,7 +28,7 @@ void process(benchmark::State& state, RenderedFlight& flight) {
     frame.timestamp = static_cast<double>(step) / camera.fps;
     state.ResumeTiming();
     const auto result = slam.process(frame);
-    if (result && result->T_world_camera) ++tracked;
+    if (result.T_world_camera) ++tracked;
     ++step;
   }
   if (tracked != step) state.SkipWithError("a frame was not tracked");

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <numeric>
 
-#include "roslam/sources/simulated_source.hpp"
+#include "simulation/simulated_source.hpp"
 
 namespace roslam::benchmarks {
+
+using namespace simulation;
 
 namespace {
 double uniform(std::mt19937& random, double low, double high) {
@@ -36,7 +38,7 @@ SE3 small_motion(double metres, double radians, std::mt19937& random) {
   return SE3::exp(twist);
 }
 
-// What a camera of ordinary noise measures of a point at the finest pyramid level.
+// Measurement of a point at the finest pyramid level, with the default noise.
 Measurement measure(const Camera& camera, const Eigen::Vector3d& point_camera, std::mt19937& random) {
   const MeasurementNoise noise;
   const double x = normal(random, noise.pixel_sigma);

@@ -6,17 +6,17 @@
 #include <random>
 #include <vector>
 
+#include "roslam/estimation/pose_optimiser.hpp"
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/geometry/camera.hpp"
-#include "roslam/geometry/pose_optimiser.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "roslam/mapping/bundle_adjustment.hpp"
-#include "roslam/sources/frame_source.hpp"
+#include "roslam/sensors/frame_source.hpp"
 
 namespace roslam::benchmarks {
 
-/// The start of a simulated flight along an empty street, drawn when it is first asked for: a benchmark that
-/// is filtered out costs nothing. Google Benchmark calls a benchmark several times, hence kept between calls.
+/// The start of a simulated flight along an empty street, rendered on first use, so that a benchmark that is
+/// filtered out costs nothing, and kept, since Google Benchmark calls a benchmark several times.
 class RenderedFlight {
  public:
   explicit RenderedFlight(std::size_t frames) : wanted_(frames) {}
@@ -35,10 +35,10 @@ class RenderedFlight {
 /// The camera of all scenes in this file: 640 x 480 without distortion.
 Camera synthetic_camera();
 
-/// Points with random places, depths and descriptors, as the extractor would give them.
+/// Features with random pixels, depths and descriptors, as the extractor gives them.
 ObservedFrame random_frame(std::size_t points, std::mt19937& random);
 
-/// The same points in another order, each with some bits of its descriptor flipped.
+/// The same features in another order, each with some bits of its descriptor flipped.
 ObservedFrame seen_again(const ObservedFrame& frame, int flipped_bits, std::mt19937& random);
 
 struct PoseScene {
@@ -47,8 +47,7 @@ struct PoseScene {
   SE3 initial_T_camera_world;
 };
 
-/// Points before a camera whose pose is known to a few centimetres; the given share of them is measured
-/// elsewhere.
+/// Points in front of a camera whose initial pose is off by a few centimetres; the given share are outliers.
 PoseScene make_pose_scene(std::size_t measurements, double outlier_share, std::mt19937& random);
 
 struct BundleSize {
@@ -57,8 +56,7 @@ struct BundleSize {
   std::size_t observations_each = 5;  ///< of a point; at most `poses`
 };
 
-/// A camera that moves sideways past a wall of points; all but the first pose, and all points, are off by a
-/// little.
+/// A camera that moves sideways past a wall of points; all but the first pose, and all points, are perturbed.
 BundleProblem make_bundle(const BundleSize& size, std::mt19937& random);
 
 }  // namespace roslam::benchmarks

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The whole of RO-SLAM in a few lines: frames in, poses out.
+// The pipeline of `roslam run` on a recording: frames in, poses out. Writes the same trajectory as the
+// program, bit for bit.
 #include <iostream>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/trajectory.hpp"
-#include "roslam/pipeline/slam.hpp"
-#include "roslam/sources/tum_source.hpp"
+#include "roslam/sensors/tum_source.hpp"
+#include "roslam/slam/open_slam.hpp"
 
 int main(int argc, char** argv) try {
   if (argc != 4) {
@@ -14,16 +15,18 @@ int main(int argc, char** argv) try {
     return 2;
   }
   roslam::TumSource source(argv[1], roslam::load_camera(argv[2]));
-  // Geometry finds what moves; a roslam::PspnetSegmenter, as the last argument, adds labels.
-  roslam::Slam slam(source.camera());
+  const auto slam = roslam::open_slam(source.camera());
   while (const auto frame = source.next()) {
-    const auto result = slam.process(*frame);
-    if (!result || !result->T_world_camera) continue;  // unusable picture, or tracking is lost
-    std::cout << std::fixed << result->timestamp << " " << result->T_world_camera->translation().transpose()
-              << "\n";
+    const roslam::FrameResult result = slam->process(*frame);
+    if (!result.is_used()) {
+      std::cerr << "frame " << result.index << ": " << roslam::describe(result.rejected) << "\n";
+    } else if (result.T_world_camera) {
+      std::cout << std::fixed << result.timestamp << " " << result.T_world_camera->translation().transpose()
+                << "\n";
+    }
   }
-  slam.finish();
-  roslam::write_trajectory(argv[3], slam.trajectory());
+  slam->finish();
+  roslam::write_trajectory(argv[3], slam->trajectory());
 } catch (const roslam::Error& error) {
   std::cerr << "error: " << error.what() << "\n";
   return 1;

@@ -11,11 +11,11 @@
 #include <string>
 #include <string_view>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam::fuzz {
 
-/// A file in memory that holds the bytes, for parsers that read files.
+/// An in-memory file of the bytes, for parsers that read files.
 class MemoryFile {
  public:
   explicit MemoryFile(std::string_view bytes) : descriptor_(memfd_create("fuzz", MFD_CLOEXEC)) {
@@ -33,7 +33,7 @@ class MemoryFile {
   int descriptor_;
 };
 
-/// Whatever the bytes are, a parser returns or throws one of the library's errors: all else is a bug.
+/// A parser must return or throw one of the library's errors for any input; anything else is a bug.
 template <typename Parse>
 int expect_result_or_error(const std::uint8_t* data, std::size_t size, const Parse& parse) {
   try {

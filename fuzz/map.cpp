@@ -2,15 +2,15 @@
 #include <cstdlib>
 
 #include "fuzz/fuzz.hpp"
-#include "roslam/atlas/map_file.hpp"
-#include "roslam/loop/essential_graph.hpp"
+#include "roslam/loop_closing/essential_graph.hpp"
+#include "roslam/map_io/map_file.hpp"
 #include "roslam/mapping/local_mapper.hpp"
-#include "roslam/tracking/place_check.hpp"
+#include "roslam/place_recognition/geometric_verifier.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace roslam;
   return fuzz::expect_result_or_error(data, size, [](std::string_view bytes) {
-    // Behind the checksum, which hardly any damaged file passes. What is read must be a map that can be used.
+    // Decodes the content without its checksum, which would reject most inputs. The result must be usable.
     const SavedMap saved = decode_map(bytes, "fuzz");
     const std::string written = encode_map(saved);
     if (encode_map(decode_map(written, "fuzz")) != written) std::abort();
@@ -18,7 +18,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const LandmarkId id : map.landmark_ids()) map.refresh(id);
     MapMutex mutex;
     for (const KeyframeId id : map.keyframe_ids()) {
-      Place::of(map, id);
+      KeyframeSnapshot::of(map, id);
       LocalBundle::around(map, id, {}, {});
       EssentialGraph::of(map, mutex, 1, {map.keyframe_ids().front(), id, SE3()});
     }

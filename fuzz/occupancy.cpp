@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/cloud/occupancy.hpp"
+#include "roslam/dense/occupancy_map.hpp"
 
 #include "fuzz/fuzz.hpp"
 
@@ -7,8 +7,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace roslam;
   return fuzz::expect_result_or_error(data, size, [](std::string_view bytes) {
     const fuzz::MemoryFile file(bytes);
-    const Occupancy read = Occupancy::read(file.path());
-    Occupancy other(read.resolution());
+    const OccupancyMap read = OccupancyMap::read(file.path());
+    OccupancyMap other(read.resolution());
     other.free_from(read);
   });
 }

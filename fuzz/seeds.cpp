@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// fuzz_seeds DIR: writes a small good file for each parser to DIR/PARSER/seed.
+// fuzz_seeds DIR: writes a small valid file for each parser to DIR/PARSER/seed.
 #include <cstdio>
 #include <random>
 
-#include "roslam/atlas/map_file.hpp"
-#include "roslam/cloud/occupancy.hpp"
-#include "roslam/cloud/surface_file.hpp"
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/write_file.hpp"
+#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/dense/surface_file.hpp"
 #include "roslam/geometry/camera.hpp"
-#include "roslam/pipeline/options.hpp"
-#include "roslam/write_file.hpp"
+#include "roslam/map_io/map_file.hpp"
+#include "roslam/slam/options.hpp"
 
 namespace {
 using namespace roslam;
@@ -49,8 +49,8 @@ SavedMap small_map() {
   return saved;
 }
 
-Surface small_surface() {
-  Surface surface;
+SurfaceMap small_surface() {
+  SurfaceMap surface;
   surface.spacing = 0.05;
   for (int i = 0; i < 4; ++i)
     surface.points.push_back({{0.1F * static_cast<float>(i), 0.0F, 1.0F}, {0.0F, 0.0F, 1.0F}, {1, 2, 3}});
@@ -74,14 +74,14 @@ int main(int count, char** arguments) {
     put("options", options_to_yaml({}));
     put("trajectory", "# time x y z\n1.5 0 0 1 0 0 0 1\n2.5 0 1 1 0 0 0.6 0.8\n");
     put("tum_list", "# time file\n1.5 rgb/1.5.png\n2.5 rgb/2.5.png\n");
-    const std::vector<std::vector<Descriptor>> pictures{random_descriptors(60)};
-    put("vocabulary", Vocabulary::train(pictures, {.branching = 3, .depth = 3}).content());
+    const std::vector<std::vector<Descriptor>> images{random_descriptors(60)};
+    put("vocabulary", Vocabulary::train(images, {.branching = 3, .depth = 3}).content());
     put("map", encode_map(small_map()));
     put("surface_ply",
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
         "element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 1e0\n3 0 1 2\n");
     write_surface_ply(folder / "surface_ply" / "binary", small_surface(), true);
-    Occupancy occupancy(0.1);
+    OccupancyMap occupancy(0.1);
     occupancy.add_surface(small_surface());
     make_folder(folder / "occupancy");
     occupancy.write(folder / "occupancy" / "states.bt");

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fuzz/fuzz.hpp"
-#include "roslam/sources/tum_source.hpp"
+#include "roslam/sensors/tum_source.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace roslam;
   return fuzz::expect_result_or_error(data, size, [](std::string_view bytes) {
     const fuzz::MemoryFile file(bytes);
     const auto list = read_tum_list(file.path());
-    associate(list, list, 0.02);
+    associate_by_time(list, list, 0.02);
   });
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Damaged recordings given to the program: one clear error, or a skip that is counted.
+// Damaged recordings: the program reports one error, or skips and counts the damaged frames.
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>

@@ -8,11 +8,13 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
-#include "roslam/error.hpp"
-#include "roslam/evaluation/bar_chart.hpp"
+#include "evaluation/plots/bar_chart.hpp"
+#include "roslam/common/error.hpp"
 #include "tests/benchmark_fixture.hpp"
 
 namespace roslam {
+
+using namespace evaluation;
 namespace {
 
 namespace fs = std::filesystem;
@@ -45,7 +47,7 @@ TEST_F(BenchmarkDynamic, RunsEveryModeWithAndWithoutTraffic) {
   EXPECT_FALSE(sequence["removal"].contains("none"));
   ASSERT_TRUE(sequence["removal"].contains("both")) << result.error;
   EXPECT_EQ(sequence["removal"]["both"]["frames"]["compared"], 5);
-  // The same flight, but what drives and walks through it.
+  // The same flight without its traffic.
   const json still = json::parse(content(folder_ / "results/runs/simulated-street-still-none-1/run.json"));
   EXPECT_EQ(still["frames"]["in_source"], 5);
   EXPECT_NE(sequence["by_mode"]["none"]["median"]["landmarks"],
@@ -57,8 +59,8 @@ TEST_F(BenchmarkDynamic, WritesTablesAndCharts) {
   ASSERT_EQ(result.code, 0) << result.error;
   const std::string markdown = content(folder_ / "results/benchmark.md");
   for (const char* words : {"none (ORB-SLAM2-like)", "both (RO-SLAM)", "| simulated-street ",
-                            "- nothing moving", "table 3 of the paper", "table 5 of the paper", "137.96",
-                            "](bars.png)", "on actors, kept", "](simulated-street.png)", "times the error"}) {
+                            "- static counterpart", "table 3 of the paper", "table 5 of the paper", "137.96",
+                            "](bars.png)", "on actors, kept", "](simulated-street.png)", "ratio of ATE"}) {
     EXPECT_NE(markdown.find(words), std::string::npos) << words << " is not in\n" << markdown;
   }
   EXPECT_EQ(markdown.find("| ds-slam-like"), std::string::npos) << "a mode that was not asked for";
@@ -68,7 +70,7 @@ TEST_F(BenchmarkDynamic, WritesTablesAndCharts) {
   EXPECT_FALSE(cv::imread((folder_ / "results/simulated-street.png").string()).empty());
 }
 
-// A sequence of the TUM benchmark in name, of the simulator in content.
+// A simulated sequence with the folder name of one of the TUM benchmark.
 TEST_F(BenchmarkDynamic, SetsPublishedFiguresBesideSequencesOfThePaperInItsOrder) {
   for (const char* name : {"walking_xyz", "walking_halfsphere"}) {
     ASSERT_EQ(roslam("simulate street --frames 5 --out tum/rgbd_dataset_freiburg3_" + std::string(name)).code,
@@ -127,13 +129,14 @@ TEST_F(BenchmarkDynamic, RunsTheFramesThatAComposedSequenceWasMadeOf) {
   EXPECT_EQ(content(folder_ / "results/runs/made-still-none-1/trajectory.txt"),
             content(folder_ / "alone/trajectory.txt"));
   EXPECT_NE(with["median"]["landmarks"], without["median"]["landmarks"]);
-  // A twin that is named goes before.
+  // A static counterpart given by name takes precedence.
   const auto named = roslam(
-      "benchmark dynamic --sequences made made --twins base base --modes none --runs 1 --out named --json");
+      "benchmark dynamic --sequences made made --counterparts base base --modes none --runs 1 --out named "
+      "--json");
   ASSERT_EQ(named.code, 0) << named.error;
   const json both = json::parse(named.out)["sequences"];
   EXPECT_EQ(both[0]["nothing_moving"]["none"]["source"], "base");
-  // The same twin is not run twice.
+  // The same static counterpart is not run twice.
   EXPECT_EQ(both[0]["nothing_moving"]["none"]["runs"], both[1]["nothing_moving"]["none"]["runs"]);
   EXPECT_EQ(both[1]["nothing_moving"]["none"]["name"], "made_2-still");
   EXPECT_FALSE(fs::exists(folder_ / "named/runs/made_2-still-none-1"));
@@ -150,11 +153,12 @@ TEST_F(BenchmarkDynamic, ExitsWithOneLineOnBadInput) {
   for (const auto& [arguments, words] : std::vector<std::pair<std::string, std::string>>{
            {"--sequences missing", "missing: no such folder"},
            {"--tum empty", "scripts/get_tum"},
-           {"--sequences flight --twins flight flight", "--twins: 2 for 1"},
-           {"--sequences flight --twins simulated:street", "--twins simulated:street"},
-           {"--sequences flight --twins empty:tum-fr1", "empty"},
+           {"--sequences flight --counterparts flight flight", "--counterparts: 2 for 1"},
+           {"--sequences flight --twins flight flight", "--counterparts: 2 for 1"},
+           {"--sequences flight --counterparts simulated:street", "--counterparts simulated:street"},
+           {"--sequences flight --counterparts empty:tum-fr1", "empty"},
            {"--sequences made", "made/composition.json"},
-           {"--sequences flight flight-still --twins flight -", "'flight-still'"},
+           {"--sequences flight flight-still --counterparts flight -", "'flight-still'"},
            {"--config none.yaml", "none.yaml"}}) {
     expect_refused("benchmark dynamic --runs 1 --out results " + arguments, words);
   }

@@ -12,7 +12,7 @@
 
 namespace roslam {
 
-/// A folder of its own in which a test runs the program.
+/// Runs the program in a temporary folder of the test.
 class BenchmarkTest : public testing::Test {
  protected:
   const std::filesystem::path folder_ = scratch_path();
@@ -26,7 +26,7 @@ class BenchmarkTest : public testing::Test {
   Outcome shell(const std::string& command) const { return shell_in(folder_, command); }
   Outcome roslam(const std::string& arguments) const { return shell("'" ROSLAM_PROGRAM "' " + arguments); }
 
-  /// Bad input: exit code 1, nothing on stdout and one line with these words on stderr.
+  /// Expects exit code 1, nothing on stdout and one line with these words on stderr.
   void expect_refused(const std::string& arguments, const std::string& words) const {
     const auto result = roslam(arguments);
     EXPECT_EQ(result.code, 1) << arguments;

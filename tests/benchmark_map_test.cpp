@@ -27,17 +27,18 @@ TEST_F(BenchmarkMap, ComparesTheMapsOfEveryStep) {
   std::map<std::string, json> maps;
   for (const json& map : sequence["maps"]) maps[map["name"]] = map;
   // Cars that drive and park hide a part of the street, which removal leaves open and restoration fills.
-  EXPECT_GT(maps["no removal"]["resting_points"].get<int>() + maps["no removal"]["ghost_points"].get<int>(),
-            10 * (maps["removal only"]["resting_points"].get<int>() +
-                  maps["removal only"]["ghost_points"].get<int>()));
-  EXPECT_LT(maps["all"]["missing_of_reference"], maps["removal only"]["missing_of_reference"]);
-  EXPECT_GT(maps["empty scene"]["completeness"], maps["removal only"]["completeness"]);
-  const double open = maps["removal only"]["missing_of_reference"],
-               left = maps["all"]["missing_of_reference"];
+  EXPECT_GT(
+      maps["no rejection"]["resting_points"].get<int>() + maps["no rejection"]["ghost_points"].get<int>(),
+      10 * (maps["rejection only"]["resting_points"].get<int>() +
+            maps["rejection only"]["ghost_points"].get<int>()));
+  EXPECT_LT(maps["all stages"]["missing_of_reference"], maps["rejection only"]["missing_of_reference"]);
+  EXPECT_GT(maps["empty scene"]["completeness"], maps["rejection only"]["completeness"]);
+  const double open = maps["rejection only"]["missing_of_reference"],
+               left = maps["all stages"]["missing_of_reference"];
   EXPECT_NEAR(sequence["filled_share"].get<double>(), 1.0 - left / open, 1e-9);
-  // All fly the same way.
-  for (const char* name : {"removal only", "and reprojection", "all"})
-    EXPECT_EQ(maps[name]["trajectory_rmse_m"], maps["no removal"]["trajectory_rmse_m"]);
+  // All have the same trajectory.
+  for (const char* name : {"rejection only", "with reprojection", "all stages"})
+    EXPECT_EQ(maps[name]["trajectory_rmse_m"], maps["no rejection"]["trajectory_rmse_m"]);
   EXPECT_GT(sequence["fuse_milliseconds"], 0.0);
   EXPECT_GT(fs::file_size(folder_ / "results/simulated-street.jpg"), 10000U);
   const std::string markdown = content(folder_ / "results/benchmark.md");

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Binary files: what is written is read, and nothing damaged is.
-#include "roslam/binary.hpp"
+// Binary files: round trip, and rejection of damaged files.
+#include "roslam/common/binary.hpp"
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 
-#include "roslam/error.hpp"
-#include "roslam/write_file.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/write_file.hpp"
 #include "tests/scratch.hpp"
 
 namespace roslam {

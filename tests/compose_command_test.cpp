@@ -166,7 +166,7 @@ TEST_F(ComposeCommand, WithoutActorsItCopiesTheSequence) {
   }
 }
 
-TEST_F(ComposeCommand, MoreActorsThanPicturesComeAgain) {
+TEST_F(ComposeCommand, MoreActorsThanImagesComeAgain) {
   const Outcome outcome = compose_base("--out out --actors 5 --json");
   ASSERT_EQ(outcome.code, 0) << outcome.error;
   const auto json = nlohmann::json::parse(outcome.out);
@@ -197,7 +197,7 @@ TEST_F(ComposeCommand, TellsWhatIsWrongWithThePeople) {
   fs::copy(folder_ / "people/green.jpg", folder_ / "bare/green.jpg");
   fails(with("bare"), "bare/green.jpg: has no mask green_mask.png");
   cv::imwrite((folder_ / "bare/green_mask.png").string(), cv::Mat(50, 50, CV_8UC1, cv::Scalar(255)));
-  fails(with("bare"), "bare/green_mask.png: is 50x50 but its picture 80x200 pixels");
+  fails(with("bare"), "bare/green_mask.png: is 50x50 but its image 80x200 pixels");
   fs::create_directories(folder_ / "empty");
   put_person("empty/one", {80, 200}, 0);
   fails(with("empty"), "empty/one_mask.png: marks no person");
@@ -263,7 +263,7 @@ TEST_F(ComposeCommand, ComposesARealSequence) {
   const auto json = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(json["frames"], 5);
   EXPECT_GT(json["covered_most"].get<double>(), 0.01);
-  // The camera looks down at a table: up is far from what its pictures have up.
+  // The camera looks down at a table: up is far from what its images have up.
   EXPECT_NEAR(json["up"][1].get<double>(), -0.89, 0.05);
   const Outcome run =
       shell_in(folder_, std::string(ROSLAM_PROGRAM) +

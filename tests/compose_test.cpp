@@ -9,12 +9,14 @@
 #include <string>
 #include <vector>
 
-#include "roslam/error.hpp"
-#include "roslam/sources/composer.hpp"
-#include "roslam/sources/depth_filling.hpp"
-#include "roslam/sources/upright.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/restoration/depth_filling.hpp"
+#include "simulation/composition/composer.hpp"
+#include "simulation/composition/upright.hpp"
 
 namespace roslam {
+
+using namespace simulation;
 namespace {
 
 constexpr double kWall = 4.0;    // metres in front of the camera
@@ -67,7 +69,7 @@ class ComposerTest : public testing::Test {
   Trajectory poses_;
 };
 
-TEST_F(ComposerTest, TheSameSeedGivesTheSamePicturesAndAnotherOneOthers) {
+TEST_F(ComposerTest, TheSameSeedGivesTheSameImagesAndAnotherOneOthers) {
   const ComposedFrame first = composer().compose(frame(30));
   const ComposedFrame again = composer().compose(frame(30));
   EXPECT_EQ(difference(first.colour, again.colour), 0.0);
@@ -162,7 +164,7 @@ TEST_F(ComposerTest, LabelsAndInstancesAgreeWithWhatChanged) {
 TEST_F(ComposerTest, NoBackgroundOfTheCutoutShows) {
   const ComposedFrame composed = composer().compose(frame(10));
   for (auto pixel = composed.colour.begin<cv::Vec3b>(); pixel != composed.colour.end<cv::Vec3b>(); ++pixel) {
-    EXPECT_LE((*pixel)[0], 120);  // blue, of which the wall has 120 and the picture around the person 255
+    EXPECT_LE((*pixel)[0], 120);  // blue, of which the wall has 120 and the image around the person 255
   }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The dense map of a run: what is written, and what becomes of it where the input is bad.
-#include "roslam/cloud/occupancy.hpp"
-#include "roslam/cloud/surface_file.hpp"
+// The dense map of a run: its files, and its behaviour with bad input.
+#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/dense/surface_file.hpp"
 #include "tests/street.hpp"
 
 namespace roslam::street {
@@ -17,7 +17,7 @@ class DenseRun : public Dataset {
 
 TEST_F(DenseRun, IsWrittenByDefault) {
   frames_of_run();
-  const Surface surface = read_surface_ply(run_ / "dense.ply");
+  const SurfaceMap surface = read_surface_ply(run_ / "dense.ply");
   EXPECT_GT(surface.points.size(), 5000U);
   EXPECT_GT(surface.triangles.size(), surface.points.size());
   EXPECT_EQ(surface.spacing, 0.05);
@@ -30,12 +30,12 @@ TEST_F(DenseRun, IsWrittenByDefault) {
   EXPECT_EQ(dense["points"], surface.points.size());
   EXPECT_EQ(dense["times_coarsened"], 0);
   EXPECT_GE(dense["keyframes"], 1);
-  // Between the camera and what it sees there is nothing.
-  const Occupancy space = Occupancy::read(run_ / "dense.bt");
+  // Space between the camera and the surfaces is free.
+  const OccupancyMap space = OccupancyMap::read(run_ / "dense.bt");
   const SE3 T_world_camera = trajectory().front().T_world_camera;
-  EXPECT_EQ(space.at(T_world_camera * Eigen::Vector3d(0.0, 0.0, 2.0)), Space::kFree);
-  EXPECT_EQ(space.at(surface.points.front().position.cast<double>()), Space::kOccupied);
-  EXPECT_EQ(space.at(T_world_camera * Eigen::Vector3d(0.0, 0.0, -5.0)), Space::kUnknown);
+  EXPECT_EQ(space.at(T_world_camera * Eigen::Vector3d(0.0, 0.0, 2.0)), OccupancyState::kFree);
+  EXPECT_EQ(space.at(surface.points.front().position.cast<double>()), OccupancyState::kOccupied);
+  EXPECT_EQ(space.at(T_world_camera * Eigen::Vector3d(0.0, 0.0, -5.0)), OccupancyState::kUnknown);
 }
 
 TEST_F(DenseRun, HasAReportToLookAt) {
@@ -54,7 +54,7 @@ TEST_F(DenseRun, HasErrorsInItsReportWhereTheTruthIsKnown) {
   ASSERT_EQ(outcome.code, 0) << outcome.error;
   const std::string html = content(run_ / "report.html");
   for (const char* words :
-       {"absolute error, m", "<h2>What was removed</h2>", "With the holes that this leaves."})
+       {"absolute error, m", "<h2>Dynamic objects</h2>", "With the holes that they leave."})
     EXPECT_NE(html.find(words), std::string::npos) << words;
 }
 
@@ -90,7 +90,7 @@ TEST_F(DenseRun, BecomesCoarserInsteadOfTooLargeAndSaysSoOnce) {
   EXPECT_EQ(outcome.out.find(note, said + 1), std::string::npos);
 }
 
-// All there is lies beyond what is fused: tracking does without the map, which is empty.
+// All surfaces lie beyond the fusion range: the dense map is empty, and tracking is not affected.
 TEST_F(DenseRun, IsEmptyWhereAllIsOutOfRange) {
   configure("dense:\n  max_depth: 0.5\n");
   const Outcome outcome = run(config());

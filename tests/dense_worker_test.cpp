@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The dense map of a flight: beside the tracker, never in its way.
-#include "roslam/pipeline/dense_worker.hpp"
+// Dense mapping in its own thread: it never blocks the tracker.
+#include "roslam/slam/dense_worker.hpp"
 
 #include <gtest/gtest.h>
 
 #include <condition_variable>
 #include <mutex>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "tests/restoration_scene.hpp"
 
 namespace roslam::scene {
 namespace {
 
-constexpr float kWallDepth = 3.0F;  // metres, of the whole picture
-constexpr WorldId kHere{0};
+constexpr float kWallDepth = 3.0F;  // metres, of the whole image
+constexpr SubmapId kHere{0};
 
 class Dense : public testing::Test {
  protected:
@@ -27,17 +27,17 @@ class Dense : public testing::Test {
       std::unique_lock lock(mutex_);
       changed_.wait(lock, [&] { return !is_held_; });
       if (fails_) throw ModelError("where that is nobody knows");
-      std::vector<KeyframePlace> places;
+      std::vector<KeyframePose> places;
       for (const KeyframeId id : ids)
         places.push_back({kHere, shift_ * SE3(Eigen::Quaterniond::Identity(), {0.05 * id.value, 0.0, 0.0})});
       return places;
     });
   }
 
-  // A wall, before which something stands in the middle of the picture.
-  DenseKeyframe keyframe(bool with_thing, bool is_restored = false) const {
+  // A wall with an object in front in the middle of the image.
+  DenseInput keyframe(bool with_thing, bool is_restored = false) const {
     const Camera& camera = stage_.camera();
-    DenseKeyframe result;
+    DenseInput result;
     result.is_restored = is_restored;
     Frame& frame = result.frame;
     frame.colour = cv::Mat(camera.height, camera.width, CV_8UC3, cv::Scalar(50, 100, 150));
@@ -50,17 +50,17 @@ class Dense : public testing::Test {
     frame.colour.setTo(cv::Scalar(0, 0, 255), mask);
     MovableObject object;
     EXPECT_TRUE(take_mask(object, mask));
-    result.removal.objects = {object};
+    result.dynamic_objects.objects = {object};
     return result;
   }
 
   DenseMap result() {
     worker_->drain();
-    return worker_->result(kHere);
+    return *worker_->result(kHere);
   }
 
-  // Points close to the optical axis of the first keyframe, where the thing stands.
-  static std::size_t in_the_middle(const Surface& surface) {
+  // Points close to the optical axis of the first keyframe, where the object is.
+  static std::size_t in_the_middle(const SurfaceMap& surface) {
     return static_cast<std::size_t>(
         std::count_if(surface.points.begin(), surface.points.end(),
                       [](const auto& p) { return p.position.template head<2>().norm() < 0.2F; }));
@@ -88,7 +88,7 @@ TEST_F(Dense, MapsWhatIsStaticAndKeepsWhatWasRemovedApart) {
   }
 }
 
-TEST_F(Dense, FusesPicturesAsTakenIfToldTo) {
+TEST_F(Dense, FusesImagesAsTakenIfToldTo) {
   DenseOptions options;
   options.remove = false;
   start(Mode::kDeterministic, options);
@@ -102,16 +102,16 @@ TEST_F(Dense, WaitsForAKeyframeToBeRestored) {
   start(Mode::kDeterministic);
   worker_->submit(KeyframeId{0}, keyframe(true, true));
   EXPECT_EQ(result().keyframes, 0U);
-  const DenseKeyframe empty = keyframe(false);
-  RestoredView view{empty.frame.colour,
-                    empty.frame.depth,
-                    cv::Mat(empty.frame.colour.size(), CV_8UC1, cv::Scalar(255)),
-                    {},
-                    {}};
+  const DenseInput empty = keyframe(false);
+  RestoredImage view{empty.frame.colour,
+                     empty.frame.depth,
+                     cv::Mat(empty.frame.colour.size(), CV_8UC1, cv::Scalar(255)),
+                     {},
+                     {}};
   worker_->restored(KeyframeId{0}, &view);
   const DenseMap map = result();
   EXPECT_GT(in_the_middle(map.surface), 20U);
-  for (const SurfacePoint& point : map.surface.points) EXPECT_EQ(point.provenance, Provenance::kInvented);
+  for (const SurfacePoint& point : map.surface.points) EXPECT_EQ(point.provenance, Provenance::kInpainted);
   EXPECT_GT(map.removed.size(), 20U);
 }
 
@@ -169,7 +169,7 @@ TEST_F(Dense, WhatGoesWrongCostsAKeyframeAndNothingElse) {
 
 TEST_F(Dense, IsEmptyWithoutDepth) {
   start(Mode::kDeterministic);
-  DenseKeyframe input = keyframe(true);
+  DenseInput input = keyframe(true);
   input.frame.depth.release();
   worker_->submit(KeyframeId{0}, input);
   const DenseMap map = result();
@@ -181,7 +181,7 @@ TEST_F(Dense, IsEmptyWithoutDepth) {
 
 TEST_F(Dense, CarriesLabelsFromWhereTheyWereTaken) {
   start(Mode::kDeterministic);
-  DenseKeyframe input = keyframe(false);
+  DenseInput input = keyframe(false);
   const Camera& camera = stage_.camera();
   // Left half building, right half vegetation, taken half a metre to the right of the keyframe: there the
   // line between both lies half a metre to the right of the optical axis.

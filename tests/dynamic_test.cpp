@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What is labelled as movable gives no points, and a run without a network says so and goes on.
+// No features on areas labelled movable; a run without a network reports that and continues.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <memory>
 
-#include "roslam/pipeline/run.hpp"
 #include "roslam/semantics/segmenter.hpp"
+#include "roslam/slam/run.hpp"
 #include "tests/street.hpp"
 
 namespace roslam::street {
@@ -25,14 +25,14 @@ class LeftIsPerson : public Segmenter {
   }
 };
 
-TEST(Removal, NoPointOfTheMapLiesOnWhatMayMove) {
+TEST(DynamicObjects, NoPointOfTheMapLiesOnWhatMayMove) {
   TumSource source(kFolder, *camera_preset("simulated"));
   Options options;
-  options.removal = *removal_from("labels");
+  options.dynamic_objects = *options_of_mode("labels");
   Slam slam(source.camera(), options, Mode::kDeterministic, std::make_shared<LeftIsPerson>());
   double removed = 0.0;
-  const RunSummary summary = run(source, slam, [&](const Frame&, const FrameResult& result) {
-    removed += cv::countNonZero(result.removal.mask);
+  const RunSummary summary = run_slam(source, slam, [&](const Frame&, const FrameResult& result) {
+    removed += cv::countNonZero(result.dynamic_objects.mask);
   });
   ASSERT_FALSE(summary.failure);
   EXPECT_GT(slam.trajectory().size(), 50U);

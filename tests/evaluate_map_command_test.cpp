@@ -7,7 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
-#include "roslam/cloud/surface_file.hpp"
+#include "roslam/dense/surface_file.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/trajectory.hpp"
 #include "tests/program.hpp"
@@ -99,21 +99,21 @@ class EvaluateMap : public testing::Test {
   }
 
   // What the first frame sees of the wall, up to a column.
-  Surface wall(int columns = 160) const {
-    Surface map;
+  SurfaceMap wall(int columns = 160) const {
+    SurfaceMap map;
     for (int y = 0; y < 120; y += 2)
       for (int x = 0; x < columns; x += 2) map.points.push_back(seen_at(x, y, kWall));
     return map;
   }
 
-  void put_thing(const cv::Rect& thing, Surface& map) const {
+  void put_thing(const cv::Rect& thing, SurfaceMap& map) const {
     for (int y = thing.y; y < thing.y + thing.height; y += 2)
       for (int x = thing.x; x < thing.x + thing.width; x += 2) map.points.push_back(seen_at(x, y, kThings));
   }
 
-  void make_run(const std::string& name, const Surface& in_truth) const {
+  void make_run(const std::string& name, const SurfaceMap& in_truth) const {
     fs::create_directories(folder_ / name);
-    Surface map = in_truth;
+    SurfaceMap map = in_truth;
     for (auto& point : map.points)
       point.position = (T_estimate_truth() * point.position.cast<double>()).cast<float>();
     write_surface_ply(folder_ / name / "dense.ply", map, true);
@@ -126,7 +126,7 @@ class EvaluateMap : public testing::Test {
     return shell_in(folder_, "'" ROSLAM_PROGRAM "' evaluate map " + arguments);
   }
 
-  // Expects success and silence.
+  // Expects success and nothing on stderr.
   json figures(const std::string& arguments) const {
     const Outcome outcome = evaluate(arguments + " --every 1 --json");
     EXPECT_EQ(outcome.code, 0) << outcome.error;
@@ -153,7 +153,7 @@ TEST_F(EvaluateMap, FindsNoErrorInAMapOfTheWall) {
 }
 
 TEST_F(EvaluateMap, ComparesMapsWithEachOtherAndAReference) {
-  Surface ghostly = wall(80);
+  SurfaceMap ghostly = wall(80);
   put_thing(walker(0), ghostly);
   put_thing(parked(), ghostly);
   make_run("other", ghostly);
@@ -180,7 +180,7 @@ TEST_F(EvaluateMap, TakesTheBackgroundFromElsewhere) {
   fs::copy(folder_ / "sequence/depth.txt", folder_ / "room/depth.txt");
   const std::string arguments = "--truth sequence --background room --estimate run";
   expect_refused(evaluate(arguments + " --quiet"), {"room: ", "--truth-depth-units"});
-  Surface ghostly = wall();
+  SurfaceMap ghostly = wall();
   put_thing(walker(0), ghostly);
   make_run("run", ghostly);
   const json found = figures(arguments + " --truth-depth-units 1000").at(0);
@@ -204,7 +204,7 @@ TEST_F(EvaluateMap, FollowsTheListsOfAComposition) {
   colour.close();
   depth.close();
   std::ofstream(folder_ / "sequence/composition.json") << R"({"background_depth_units_per_metre": 5000})";
-  Surface ghostly = wall();
+  SurfaceMap ghostly = wall();
   put_thing(walker(0), ghostly);
   make_run("run", ghostly);
   const json found = figures_of_one();
@@ -218,14 +218,14 @@ TEST_F(EvaluateMap, FollowsTheListsOfAComposition) {
 TEST_F(EvaluateMap, TakesTheDepthOfThingsFromWhereItIsBest) {
   fs::copy(folder_ / "sequence", folder_ / "ideal", fs::copy_options::recursive);
   for (int i = 0; i < kFrames; ++i) put("depth/" + stamp(i) + ".png", image(CV_16UC1, 1000.0));
-  Surface ghostly = wall();
+  SurfaceMap ghostly = wall();
   put_thing(walker(0), ghostly);
   make_run("run", ghostly);
   EXPECT_EQ(figures_of_one()["ghost_points"], 0);  // 1 m too near
   EXPECT_EQ(figures("--truth sequence --background ideal --estimate run").at(0)["ghost_points"], 8 * 30);
 }
 
-// Clouds in one world, of which nothing else is known.
+// Point clouds in one frame, without trajectories or frames.
 TEST_F(EvaluateMap, ComparesFilesWithACloud) {
   fs::create_directories(folder_ / "half");
   write_surface_ply(folder_ / "truth.ply", wall(), false);
@@ -244,7 +244,7 @@ TEST_F(EvaluateMap, TakesAMapForItsRun) {
 }
 
 TEST_F(EvaluateMap, AnEmptyMapIsComparedToo) {
-  make_run("run", Surface());
+  make_run("run", SurfaceMap());
   const json found = figures_of_one();
   EXPECT_EQ(found["points"], 0);
   EXPECT_EQ(found["completeness"], 0.0);
@@ -285,7 +285,7 @@ TEST_F(EvaluateMap, KnowsWhatSimulateWrites) {
   const Camera camera = read_camera(folder_ / "street/camera.yaml");
   const cv::Mat depth =
       cv::imread((folder_ / "street/background/depth/0.000000.png").string(), cv::IMREAD_UNCHANGED);
-  Surface map;
+  SurfaceMap map;
   for (int y = 0; y < depth.rows; y += 2) {
     for (int x = 0; x < depth.cols; x += 2) {
       const int raw = depth.at<std::uint16_t>(y, x);

@@ -92,7 +92,7 @@ class EvaluateRemoval : public testing::Test {
     return shell_in(folder_, "'" ROSLAM_PROGRAM "' evaluate removal " + arguments);
   }
 
-  // Expects success and silence.
+  // Expects success and nothing on stderr.
   json figures(const std::string& source = "sequence") const {
     const Outcome outcome = evaluate(source + " --camera camera.yaml --run run --json");
     EXPECT_EQ(outcome.code, 0) << outcome.error;
@@ -151,7 +151,7 @@ TEST_F(EvaluateRemoval, KnowsActorsByAnyKindOfTruth) {
   put_labels(2, 13);
   EXPECT_EQ(figures(), by_instances);  // a car before a building
   std::ofstream(folder_ / "sequence/labels/labels.json") << "{}";
-  refuses("sequence: does not know what moves");
+  refuses("sequence: has no truth of the dynamic objects");
 }
 
 TEST_F(EvaluateRemoval, WhatRestsIsNoPartOfTheScene) {
@@ -203,13 +203,13 @@ TEST_F(EvaluateRemoval, TellsWhatIsWrongWithTheRun) {
     fs::copy(folder_ / "copy", folder_ / "run", fs::copy_options::recursive);
   };
   cv::imwrite(some_mask().string(), cv::Mat(20, 30, CV_8UC1, cv::Scalar(1)));
-  refuses("is 30x20 but the picture of that time 320x240 pixels");
+  refuses("is 30x20 but the image of that time 320x240 pixels");
   restore();
   rewrite("run/descriptors.jsonl", "\"kept_points\"", "\"others\"");
-  refuses("run/descriptors.jsonl:1: is no line");
+  refuses("run/descriptors.jsonl:1: is not a record");
   restore();
   fs::resize_file(folder_ / "run/descriptors.jsonl", fs::file_size(folder_ / "run/descriptors.jsonl") - 20);
-  refuses("run/descriptors.jsonl:5: is no line");
+  refuses("run/descriptors.jsonl:5: is not a record");
   fs::remove(folder_ / "run/descriptors.jsonl");
   refuses("run/descriptors.jsonl: cannot open it");
   restore();
@@ -237,7 +237,8 @@ TEST_F(EvaluateRemoval, TellsARunOfAnotherSequence) {
     cv::RNG(i).fill(colour, cv::RNG::UNIFORM, 0, 255);
     put("sequence/rgb/" + name(i), colour);
   }
-  refuses("run: 5 of 5 frames of sequence have not as many points as the run counted; give the SOURCE");
+  refuses(
+      "run: 5 of 5 frames of sequence have another number of points than the run counted; give the SOURCE");
 }
 
 TEST_F(EvaluateRemoval, TellsWhatIsWrongWithTheSource) {
@@ -247,7 +248,7 @@ TEST_F(EvaluateRemoval, TellsWhatIsWrongWithTheSource) {
   refuses("colour image is 320x240 but the camera 640x480", "sequence --camera tum-fr1 --run run");
   refuses("simulated:nowhere: no such flight", "simulated:nowhere --run run");
   fs::remove_all(folder_ / "sequence/instances");
-  refuses("sequence: does not know what moves in it");
+  refuses("sequence: has no truth of the dynamic objects");
 }
 
 TEST_F(EvaluateRemoval, KnowsWhatMovesInASimulatedFlight) {

@@ -6,14 +6,16 @@
 #include <numbers>
 #include <random>
 
-#include "roslam/error.hpp"
-#include "roslam/evaluation/plot.hpp"
-#include "roslam/evaluation/point_grid.hpp"
-#include "roslam/evaluation/trajectory_error.hpp"
-#include "roslam/evaluation/trajectory_plot.hpp"
+#include "evaluation/plots/plot.hpp"
+#include "evaluation/point_grid.hpp"
+#include "evaluation/trajectory_error.hpp"
+#include "evaluation/trajectory_plot.hpp"
+#include "roslam/common/error.hpp"
 #include "tests/scratch.hpp"
 
 namespace roslam {
+
+using namespace evaluation;
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180.0;

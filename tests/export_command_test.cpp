@@ -9,9 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "roslam/cloud/occupancy.hpp"
-#include "roslam/cloud/surface_file.hpp"
-#include "roslam/write_file.hpp"
+#include "roslam/common/write_file.hpp"
+#include "roslam/dense/depth_keyframe.hpp"
+#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/dense/surface_file.hpp"
 #include "tests/program.hpp"
 #include "tests/scratch.hpp"
 
@@ -19,10 +20,10 @@ namespace {
 using namespace roslam;
 namespace fs = std::filesystem;
 
-// A square of the plane z = 0, the right half of which was invented.
-Surface square() {
+// A square of the plane z = 0, the right half of which is inpainted.
+SurfaceMap square() {
   constexpr int kSide = 20;
-  Surface surface;
+  SurfaceMap surface;
   surface.spacing = 0.1;
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {
@@ -31,7 +32,7 @@ Surface square() {
            {0.0F, 0.0F, 1.0F},
            {static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), 200},
            static_cast<std::uint8_t>(x % 19),
-           x < kSide / 2 ? Provenance::kMeasured : Provenance::kInvented});
+           x < kSide / 2 ? Provenance::kMeasured : Provenance::kInpainted});
       if (x == 0 || y == 0) continue;
       const auto at = static_cast<std::uint32_t>(y * kSide + x);
       surface.triangles.push_back({at - kSide - 1, at - kSide, at});
@@ -52,7 +53,7 @@ Value take(const std::string& bytes, std::size_t& at) {
 
 class Export : public testing::Test {
  protected:
-  // A run folder: the map and, as it is written by a run, what was free.
+  // A run folder: the map and its free space, as a run writes them.
   void SetUp() override {
     make_folder(folder / "run");
     write_surface_ply(folder / "run/dense.ply", square(), true);
@@ -61,13 +62,13 @@ class Export : public testing::Test {
 
   // A ray from high above the plane down to it.
   void write_free_space() const {
-    DenseView view{{},
-                   cv::Mat(1, 1, CV_8UC3),
-                   cv::Mat(1, 1, CV_32FC1, cv::Scalar(2.0)),
-                   cv::Mat(1, 1, CV_8UC1),
-                   cv::Mat::zeros(1, 1, CV_8UC1)};
+    DepthKeyframe view{{},
+                       cv::Mat(1, 1, CV_8UC3),
+                       cv::Mat(1, 1, CV_32FC1, cv::Scalar(2.0)),
+                       cv::Mat(1, 1, CV_8UC1),
+                       cv::Mat::zeros(1, 1, CV_8UC1)};
     view.camera.cx = view.camera.cy = 0.0;
-    Occupancy seen(0.25);
+    OccupancyMap seen(0.25);
     seen.add_view(view, SE3(so3_exp({M_PI, 0.0, 0.0}), {0.6, 0.6, 2.1}));
     seen.write(folder / "run/dense.bt");
   }
@@ -116,7 +117,7 @@ TEST_F(Export, IsReadByThePointCloudLibrary) {
 }
 
 TEST_F(Export, WritesPointsAndMeshAsPly) {
-  const Surface surface = square();
+  const SurfaceMap surface = square();
   const Outcome outcome = export_map("run --ply points.ply --mesh mesh.ply");
   ASSERT_EQ(outcome.code, 0) << outcome.error;
   EXPECT_NE(outcome.out.find("400 points and 722 triangles: mesh.ply"), std::string::npos) << outcome.out;
@@ -179,14 +180,16 @@ TEST_F(Export, WritesPcdWhoseHeaderTellsWhatIsInIt) {
 }
 
 TEST_F(Export, LeavesOutWhatNobodySaw) {
-  ASSERT_EQ(export_map("run --no-invented --mesh mesh.ply --octomap map.bt").code, 0);
-  const Surface seen = read_surface_ply(folder / "mesh.ply");
+  ASSERT_EQ(export_map("run --no-inpainted --mesh mesh.ply --octomap map.bt").code, 0);
+  const SurfaceMap seen = read_surface_ply(folder / "mesh.ply");
   EXPECT_EQ(seen.points.size(), 200U);
   EXPECT_EQ(seen.triangles.size(), 19U * 9U * 2U);
+  ASSERT_EQ(export_map("run --no-invented --mesh old.ply").code, 0);  // the flag's old name
+  EXPECT_EQ(content(folder / "old.ply"), content(folder / "mesh.ply"));
   for (const SurfacePoint& point : seen.points) EXPECT_EQ(point.provenance, Provenance::kMeasured);
-  const Occupancy space = Occupancy::read(folder / "map.bt");
-  EXPECT_EQ(space.at({0.5, 0.5, 0.05}), Space::kOccupied);
-  EXPECT_EQ(space.at({1.5, 0.5, 0.05}), Space::kUnknown);
+  const OccupancyMap space = OccupancyMap::read(folder / "map.bt");
+  EXPECT_EQ(space.at({0.5, 0.5, 0.05}), OccupancyState::kOccupied);
+  EXPECT_EQ(space.at({1.5, 0.5, 0.05}), OccupancyState::kUnknown);
 }
 
 TEST_F(Export, WritesOccupancyWithTheFreeSpaceOfTheRun) {
@@ -194,25 +197,25 @@ TEST_F(Export, WritesOccupancyWithTheFreeSpaceOfTheRun) {
   ASSERT_EQ(alone.code, 0) << alone.error;
   EXPECT_NE(alone.error.find("dense.bt"), std::string::npos);
   EXPECT_NE(alone.error.find("only occupied"), std::string::npos);
-  EXPECT_EQ(Occupancy::read(folder / "alone.bt").resolution(), 0.2);  // twice the spacing
-  EXPECT_EQ(Occupancy::read(folder / "alone.bt").free_volume(), 0.0);
+  EXPECT_EQ(OccupancyMap::read(folder / "alone.bt").resolution(), 0.2);  // twice the spacing
+  EXPECT_EQ(OccupancyMap::read(folder / "alone.bt").free_volume(), 0.0);
 
   write_free_space();
   for (const std::string name : {"map.bt", "map.ot"}) {
     const Outcome outcome = export_map("run --octomap " + name);
     ASSERT_EQ(outcome.code, 0) << outcome.error;
     EXPECT_EQ(outcome.error, "");
-    const Occupancy space = Occupancy::read(folder / name);
+    const OccupancyMap space = OccupancyMap::read(folder / name);
     EXPECT_EQ(space.resolution(), 0.25);  // of dense.bt
-    EXPECT_EQ(space.at({0.6, 0.6, 0.05}), Space::kOccupied);
-    EXPECT_EQ(space.at({0.6, 0.6, 1.0}), Space::kFree);
-    EXPECT_EQ(space.at({1.6, 0.6, 1.0}), Space::kUnknown);
+    EXPECT_EQ(space.at({0.6, 0.6, 0.05}), OccupancyState::kOccupied);
+    EXPECT_EQ(space.at({0.6, 0.6, 1.0}), OccupancyState::kFree);
+    EXPECT_EQ(space.at({1.6, 0.6, 1.0}), OccupancyState::kUnknown);
   }
   ASSERT_EQ(export_map("run --octomap fine.bt --resolution 0.05").code, 0);
-  const Occupancy fine = Occupancy::read(folder / "fine.bt");
+  const OccupancyMap fine = OccupancyMap::read(folder / "fine.bt");
   EXPECT_EQ(fine.resolution(), 0.05);
-  EXPECT_EQ(fine.at({0.6, 0.6, 1.0}), Space::kFree);
-  EXPECT_EQ(fine.at({0.55, 0.55, 0.05}), Space::kOccupied);
+  EXPECT_EQ(fine.at({0.6, 0.6, 1.0}), OccupancyState::kFree);
+  EXPECT_EQ(fine.at({0.55, 0.55, 0.05}), OccupancyState::kOccupied);
 }
 
 TEST_F(Export, RefusesWhatDoesNotFit) {
@@ -221,7 +224,7 @@ TEST_F(Export, RefusesWhatDoesNotFit) {
   expect_refused("run --octomap map.octomap", 2, {".bt or .ot"});
   expect_refused("run --octomap x.bt --resolution 0", 2, {"--resolution"});
   expect_refused("run/dense.ply --keyframes x.txt", 2, {"--keyframes", "map.roslam"});
-  expect_refused("run/dense.ply --ply x.ply --flight 0", 2, {"--flight"});
+  expect_refused("run/dense.ply --ply x.ply --flight 0", 2, {"--session"});
   expect_refused("run/map.roslam --pcd x.pcd", 2, {"--pcd", "dense map"});
   expect_refused("run --keyframes x.txt --mesh x.ply", 2, {"--mesh"});
   // Of a run folder, what holds poses.
@@ -232,16 +235,16 @@ TEST_F(Export, RefusesWhatDoesNotFit) {
 }
 
 TEST_F(Export, SaysWhenThereIsNothingToWrite) {
-  Surface surface;
+  SurfaceMap surface;
   write_surface_ply(folder / "empty.ply", surface, true);
   for (const std::string format : {"--ply x.ply", "--mesh x.ply", "--pcd x.pcd", "--octomap x.bt"})
     expect_refused("empty.ply " + format, 1, {"empty.ply", "map is empty", "depth"});
   surface = square();
   write_surface_ply(folder / "points.ply", surface, false);
   expect_refused("points.ply --ply x.ply --mesh y.ply", 1, {"points.ply", "no triangles", "--mesh"});
-  for (SurfacePoint& point : surface.points) point.provenance = Provenance::kInvented;
+  for (SurfacePoint& point : surface.points) point.provenance = Provenance::kInpainted;
   write_surface_ply(folder / "invented.ply", surface, true);
-  expect_refused("invented.ply --no-invented --ply x.ply", 1, {"invented.ply", "leave out --no-invented"});
+  expect_refused("invented.ply --no-inpainted --ply x.ply", 1, {"invented.ply", "leave out --no-inpainted"});
   write_file(folder / "run/dense.bt", "no tree");
   expect_refused("run --octomap x.bt", 1, {"run/dense.bt", "no usable OctoMap file"});
   for (const char* name : {"x.ply", "y.ply", "x.pcd", "x.bt"})

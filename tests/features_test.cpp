@@ -6,14 +6,16 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/features/descriptor.hpp"
 #include "roslam/features/feature_grid.hpp"
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/features/orb_extractor.hpp"
-#include "roslam/sources/depth_noise.hpp"
+#include "simulation/depth_noise.hpp"
 
 namespace roslam {
+
+using namespace simulation;
 namespace {
 
 // Blobs of random size and grey level: corners everywhere, at all scales.

@@ -4,7 +4,7 @@
 #include <fstream>
 #include <random>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "tests/scratch.hpp"

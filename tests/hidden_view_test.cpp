@@ -1,31 +1,34 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Something that moves fills the view for a while: poses go on as predictions that nobody trusts, and
-// tracking takes up again in the same map when the view clears.
+// A moving object fills the image for a while: poses are predicted, with tracking quality 0, and tracking
+// resumes in the same map when the view clears.
 #include <gtest/gtest.h>
 
 #include <memory>
 #include <opencv2/imgproc.hpp>
 
+#include "recording/removal_log.hpp"
+#include "recording/run_folder.hpp"
 #include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/local_mapper.hpp"
-#include "roslam/pipeline/removal_log.hpp"
-#include "roslam/pipeline/run.hpp"
-#include "roslam/pipeline/run_folder.hpp"
 #include "roslam/semantics/segmenter.hpp"
+#include "roslam/slam/run.hpp"
+#include "roslam/slam/settings.hpp"
 #include "roslam/tracking/tracker.hpp"
 #include "tests/street_frames.hpp"
 
 namespace roslam::street {
+
+using namespace recording;
 namespace {
 
 constexpr std::uint8_t kPersonLabel = 11;
 constexpr std::size_t kHidden = 25;  // the first frame that shows no street
 const cv::Scalar kCoat(90, 90, 90);
 
-// What stands close before the camera: a part of the picture, from the left.
+// An object close to the camera: a share of the image, from the left.
 cv::Rect coat(double share) { return {0, 0, static_cast<int>(640 * share), 480}; }
 
-// Knows the coat by its colour.
+// Labels the coat by its colour.
 class CoatIsPerson : public Segmenter {
  public:
   Segmentation segment(const cv::Mat& image) override {
@@ -44,7 +47,7 @@ class CoatIsPerson : public Segmenter {
 
 class HiddenView : public Street {
  protected:
-  // A coat over a share of the picture, fog over the rest.
+  // A coat over a share of the image, fog over the rest.
   static Frame hidden(std::size_t index, double share) {
     Frame frame = blank(index, cv::Scalar::all(200));
     frame.colour(coat(share)).setTo(kCoat);
@@ -82,26 +85,26 @@ TEST_F(HiddenView, IsBridgedByPredictionsAndTrackingTakesUpAgain) {
   std::size_t keyframes = 0;
   for (const Frame& frame : sequence(kEndHidden, kBeforeGap)) {
     const auto result = slam->process(frame);
-    ASSERT_TRUE(result);
+    ASSERT_TRUE(result.is_used());
     const Frame& street = frames_->at(frame.index);  // as it would have been
     if (frame.index < kHidden) {
-      ASSERT_EQ(result->state, TrackingState::kTracking) << frame.index;
-      EXPECT_EQ(result->trust, 1.0);
-      expect_near_truth(street, *result, 0.05);
+      ASSERT_EQ(result.state, TrackingState::kTracking) << frame.index;
+      EXPECT_EQ(result.quality, 1.0);
+      expect_near_truth(street, result, 0.05);
       keyframes = slam->map().keyframe_count();
     } else if (frame.index < kEndHidden) {
-      EXPECT_EQ(result->state, TrackingState::kPredicted) << frame.index;
-      EXPECT_EQ(result->trust, 0.0);
-      EXPECT_EQ(result->inliers, 0);
-      EXPECT_FALSE(result->is_keyframe);
+      EXPECT_EQ(result.state, TrackingState::kPredicted) << frame.index;
+      EXPECT_EQ(result.quality, 0.0);
+      EXPECT_EQ(result.inliers, 0);
+      EXPECT_FALSE(result.is_keyframe);
       EXPECT_EQ(slam->map().keyframe_count(), keyframes);
       // A third of a second at a metre a second.
-      expect_near_truth(street, *result, 0.15);
+      expect_near_truth(street, result, 0.15);
     } else {
-      EXPECT_EQ(result->state, TrackingState::kTracking) << frame.index;
-      EXPECT_GT(result->inliers, 60);
-      EXPECT_EQ(result->trust, 1.0);
-      expect_near_truth(street, *result, 0.05);
+      EXPECT_EQ(result.state, TrackingState::kTracking) << frame.index;
+      EXPECT_GT(result.inliers, 60);
+      EXPECT_EQ(result.quality, 1.0);
+      expect_near_truth(street, result, 0.05);
     }
   }
   slam->finish();
@@ -118,21 +121,21 @@ TEST_F(HiddenView, IsLostWhereItLastsTooLongAndFoundAgain) {
   std::size_t recovered = 0;
   for (const Frame& frame : sequence(kGapEnd, kEnd)) {
     const auto result = slam->process(frame);
-    ASSERT_TRUE(result);
+    ASSERT_TRUE(result.is_used());
     if (frame.index < kHidden) {
-      expect_near_truth(frame, *result, 0.05);
+      expect_near_truth(frame, result, 0.05);
     } else if (frame.index < kGapEnd) {
       const bool is_given_up = frame.index >= kGivenUp;
-      EXPECT_EQ(result->T_world_camera.has_value(), !is_given_up) << frame.index;
-      EXPECT_EQ(result->state, !is_given_up                  ? TrackingState::kPredicted
-                               : frame.index < kGivenUp + 30 ? TrackingState::kRecentlyLost
-                                                             : TrackingState::kLost)
+      EXPECT_EQ(result.T_world_camera.has_value(), !is_given_up) << frame.index;
+      EXPECT_EQ(result.state, !is_given_up                  ? TrackingState::kPredicted
+                              : frame.index < kGivenUp + 30 ? TrackingState::kRecentlyLost
+                                                            : TrackingState::kLost)
           << frame.index;
-      EXPECT_EQ(result->trust, 0.0);
-    } else if (result->T_world_camera) {
+      EXPECT_EQ(result.quality, 0.0);
+    } else if (result.T_world_camera) {
       ++recovered;
-      EXPECT_EQ(result->state, TrackingState::kTracking);
-      expect_near_truth(frame, *result, 0.1);
+      EXPECT_EQ(result.state, TrackingState::kTracking);
+      expect_near_truth(frame, result, 0.1);
     }
   }
   EXPECT_GE(recovered, kEnd - kGapEnd - 1);
@@ -144,8 +147,8 @@ TEST_F(HiddenView, IsNotPredictedWhereNothingMoves) {
   const auto slam = slam_with();
   for (const Frame& frame : with_blank(kHidden, kHidden + 3, kHidden + 3, cv::Scalar::all(200))) {
     const auto result = slam->process(frame);
-    ASSERT_TRUE(result);
-    EXPECT_EQ(result->state, frame.index < kHidden ? TrackingState::kTracking : TrackingState::kRecentlyLost);
+    ASSERT_TRUE(result.is_used());
+    EXPECT_EQ(result.state, frame.index < kHidden ? TrackingState::kTracking : TrackingState::kRecentlyLost);
   }
 }
 
@@ -155,8 +158,8 @@ TEST_F(HiddenView, IsNotPredictedWhereItIsNotWanted) {
   const auto slam = slam_with(options);
   for (const Frame& frame : sequence(kHidden + 3, kHidden + 3)) {
     const auto result = slam->process(frame);
-    ASSERT_TRUE(result);
-    EXPECT_EQ(result->state, frame.index < kHidden ? TrackingState::kTracking : TrackingState::kRecentlyLost);
+    ASSERT_TRUE(result.is_used());
+    EXPECT_EQ(result.state, frame.index < kHidden ? TrackingState::kTracking : TrackingState::kRecentlyLost);
   }
 }
 
@@ -175,7 +178,7 @@ class HiddenTracker : public Street {
   }
 
   static Tracker::Settings settings() {
-    Tracker::Settings settings = Options().tracker_settings();
+    Tracker::Settings settings = tracker_settings(Options());
     settings.tracker.min_inliers = 60;
     settings.relocaliser.min_inliers = 8;  // recognised, but not confirmed
     return settings;
@@ -191,7 +194,7 @@ class HiddenTracker : public Street {
   const OrbExtractor extractor_;
   Map map_{scales(extractor_)};
   MapMutex mutex_;
-  LocalMapper mapper_{camera_, map_, mutex_, Options().mapper_settings()};
+  LocalMapper mapper_{camera_, map_, mutex_, mapper_settings(Options())};
   Tracker tracker_{camera_, map_, settings()};
 };
 
@@ -205,16 +208,16 @@ TEST_F(HiddenTracker, PredictionsSurviveAPlaceThatIsRecognisedButNotConfirmed) {
     if (!first) first = tracked.T_camera_world->inverse();
     if (i != 0 && i != kLast) continue;
     const KeyframeId keyframe = mapper_.insert(tracked, i);
-    tracker_.promoted(keyframe);
+    tracker_.keyframe_created(keyframe);
   }
-  // What little is left of the view looks like the first keyframe, which lies more than a metre back, but is
-  // too little to tell.
+  // The visible remainder matches the first keyframe, more than a metre back, but has too few points to
+  // relocalise.
   const auto scrap = view(0, {0, 430, 640, 50}, 50);
   const Tracker::Settings given = settings();
-  PlaceCheck check(camera_, {given.place_check, given.matcher, given.pose, given.noise});
-  const auto place = Relocaliser(given.relocaliser, check).find(map_, *scrap, {}, false);
-  ASSERT_TRUE(place);
-  ASSERT_EQ(place->place, map_.keyframe_ids().front());
+  GeometricVerifier check(camera_, {given.geometric_verifier, given.matcher, given.pose, given.noise});
+  const auto match = Relocaliser(given.relocaliser, check).find(map_, *scrap, {}, false);
+  ASSERT_TRUE(match);
+  ASSERT_EQ(match->matched_keyframe, map_.keyframe_ids().front());
   for (std::size_t i = kLast + 1; i < kLast + 4; ++i) {
     const auto tracked = tracker_.track(scrap, time_of(i), {{}, 0.8});
     ASSERT_EQ(tracked.state, TrackingState::kPredicted) << i;
@@ -244,14 +247,15 @@ TEST_F(HiddenView, IsReported) {
   Frames source(sequence(kHidden + 10, kHidden + 20));
   const auto slam = slam_with();
   RemovalLog log({folder, Mode::kDeterministic, 30.0, false});
-  RunSummary summary =
-      run(source, *slam, [&](const Frame& frame, const FrameResult& result) { log.add(frame, result); });
+  RunResults summary;
+  static_cast<RunSummary&>(summary) =
+      run_slam(source, *slam, [&](const Frame& frame, const FrameResult& result) { log.add(frame, result); });
   ASSERT_FALSE(summary.failure);
   log.finish();
   summary.removal = log.tally();
   const auto report = nlohmann::json::parse(run_report(*slam, summary, source, {}));
   EXPECT_EQ(report["dynamic"]["predicted_frames"], 10);
-  EXPECT_EQ(report["dynamic"]["low_trust_frames"], 10);
+  EXPECT_EQ(report["dynamic"]["low_quality_frames"], 10);
   EXPECT_EQ(report["frames"]["by_state"]["predicted"], 10);
   EXPECT_EQ(report["frames"]["tracked"], kHidden + 10);
   EXPECT_EQ(report["frames"]["processed"], kHidden + 20);
@@ -261,7 +265,7 @@ TEST_F(HiddenView, IsReported) {
     const auto line = nlohmann::json::parse(text);
     const bool is_hidden = index >= kHidden && index < kHidden + 10;
     EXPECT_EQ(line["state"], is_hidden ? "predicted" : "tracking") << index;
-    EXPECT_EQ(line["trust"], is_hidden ? 0.0 : 1.0) << index;
+    EXPECT_EQ(line["quality"], is_hidden ? 0.0 : 1.0) << index;
     if (is_hidden) {
       EXPECT_GT(line["removed_area"], 0.7);
     }

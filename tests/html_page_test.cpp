@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Reports to look at.
-#include "roslam/evaluation/html_page.hpp"
+#include "evaluation/plots/html_page.hpp"
 
 #include <gtest/gtest.h>
 
-#include "roslam/picture_strip.hpp"
+#include "recording/image_strip.hpp"
 
 namespace roslam {
+
+using namespace evaluation;
+using namespace recording;
 namespace {
 
 // The vectors of RFC 4648, section 10.
@@ -31,23 +34,23 @@ TEST(HtmlPage, ShowsTextAsItIs) {
   EXPECT_EQ(html.find("<script"), std::string::npos);
 }
 
-TEST(HtmlPage, HoldsItsPictures) {
-  HtmlPage page("pictures");
-  page.add_picture(cv::Mat(20, 30, CV_8UC3, cv::Scalar(1, 2, 3)), "a \"picture\"");
-  page.add_picture_file("/nowhere/there_is_none.jpg", "none");
+TEST(HtmlPage, HoldsItsImages) {
+  HtmlPage page("images");
+  page.add_image(cv::Mat(20, 30, CV_8UC3, cv::Scalar(1, 2, 3)), "a \"image\"");
+  page.add_image_file("/nowhere/there_is_none.jpg", "none");
   const std::string html = page.html();
-  EXPECT_NE(html.find("alt=\"a &quot;picture&quot;\" src=\"data:image/jpeg;base64,/9j/"), std::string::npos);
+  EXPECT_NE(html.find("alt=\"a &quot;image&quot;\" src=\"data:image/jpeg;base64,/9j/"), std::string::npos);
   EXPECT_EQ(html.find("none"), std::string::npos);
 }
 
-// However long the sequence, the pictures that stay are spread over it evenly.
-TEST(PictureStrip, KeepsPicturesSpreadOverTheSequence) {
+// However long the sequence, the images that stay are spread over it evenly.
+TEST(ImageStrip, KeepsImagesSpreadOverTheSequence) {
   for (const int length : {1, 3, 4, 7, 8, 9, 16, 17, 100, 1000}) {
-    PictureStrip strip(4);
+    ImageStrip strip(4);
     for (int i = 0; i < length; ++i)
       if (strip.wants()) strip.add(cv::Mat(1, 1, CV_32SC1, cv::Scalar(i)));
     std::vector<int> kept;
-    for (const cv::Mat& picture : strip.pictures()) kept.push_back(picture.at<int>(0));
+    for (const cv::Mat& image : strip.images()) kept.push_back(image.at<int>(0));
     ASSERT_EQ(kept.size(), static_cast<std::size_t>(std::min(length, 4))) << length;
     EXPECT_EQ(kept.front(), 0);
     for (std::size_t i = 1; i < kept.size(); ++i) {

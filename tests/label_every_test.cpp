@@ -5,8 +5,8 @@
 #include <memory>
 #include <opencv2/imgproc.hpp>
 
-#include "roslam/pipeline/slam.hpp"
 #include "roslam/semantics/segmenter.hpp"
+#include "roslam/slam/slam.hpp"
 #include "tests/street_frames.hpp"
 
 namespace roslam::street {
@@ -16,7 +16,7 @@ constexpr std::uint8_t kPersonLabel = 11;
 constexpr std::size_t kLabelEvery = 3;
 const cv::Scalar kCoat(40, 60, 170);
 
-// Somebody in a striped coat who walks by, three metres off. Moves 4 pixels a frame.
+// A person in a striped coat who walks by at 3 m, 4 pixels a frame.
 cv::Rect walker(std::size_t frame) { return {150 + 4 * static_cast<int>(frame), 120, 110, 300}; }
 
 Frame with_walker(const Frame& street) {
@@ -61,14 +61,14 @@ class LabelEvery : public Street {
  protected:
   static Flight fly() {
     Options options;
-    options.removal.label_every = static_cast<int>(kLabelEvery);
+    options.dynamic_objects.label_every = static_cast<int>(kLabelEvery);
     const auto segmenter = std::make_shared<FindsCoat>();
     Slam slam(*camera_preset("simulated"), options, Mode::kDeterministic, segmenter);
     Flight outcome;
     for (std::size_t i = 0; i < kFrameCount; ++i) {
       auto result = slam.process(with_walker(frames_->at(i)));
-      EXPECT_TRUE(result);
-      if (result) outcome.results.push_back(std::move(*result));
+      EXPECT_TRUE(result.is_used());
+      outcome.results.push_back(std::move(result));
     }
     slam.finish();
     EXPECT_EQ(segmenter->calls, kFrameCount / kLabelEvery);
@@ -92,8 +92,8 @@ TEST_F(LabelEvery, GivesTheSameBitsAgain) {
   for (std::size_t i = 0; i < kFrameCount; ++i) {
     EXPECT_EQ(one.trajectory[i].timestamp, two.trajectory[i].timestamp);
     EXPECT_EQ(one.trajectory[i].T_world_camera.matrix(), two.trajectory[i].T_world_camera.matrix()) << i;
-    const Removal& a = one.results[i].removal;
-    const Removal& b = two.results[i].removal;
+    const DynamicObjects& a = one.results[i].dynamic_objects;
+    const DynamicObjects& b = two.results[i].dynamic_objects;
     EXPECT_TRUE(is_same(a.mask, b.mask)) << i;
     EXPECT_TRUE(is_same(a.resting, b.resting)) << i;
     EXPECT_EQ(a.label_age, b.label_age) << i;
@@ -110,7 +110,7 @@ TEST_F(LabelEvery, GivesTheSameBitsAgain) {
 TEST_F(LabelEvery, ThingsAreRemovedInTheFramesBetween) {
   const Flight outcome = fly();
   for (std::size_t i = 0; i < kFrameCount; ++i) {
-    const Removal& removal = outcome.results[i].removal;
+    const DynamicObjects& removal = outcome.results[i].dynamic_objects;
     EXPECT_EQ(removal.label_age, static_cast<int>(i % kLabelEvery)) << i;
     ASSERT_FALSE(removal.mask.empty()) << i;
     const cv::Mat on_walker = removal.mask(walker(i));

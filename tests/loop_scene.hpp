@@ -9,14 +9,14 @@
 #include <vector>
 
 #include "roslam/geometry/camera.hpp"
-#include "roslam/loop/loop_closer.hpp"
+#include "roslam/loop_closing/loop_closer.hpp"
 #include "roslam/map/map.hpp"
-#include "roslam/places/place_index.hpp"
+#include "roslam/place_recognition/keyframe_database.hpp"
 
 namespace roslam::scene {
 
-/// A wall with points that all look different, and a camera that flies along it; the map is what odometry
-/// with drift would make of it, so that what loop closing has to find is known.
+/// A wall of points with distinct descriptors, and a camera that flies along it; the map is built as by
+/// odometry with known drift, so that the correct loop closure is known.
 class WallFlight {
  public:
   struct Point {
@@ -34,7 +34,7 @@ class WallFlight {
 
   double normal() { return std::normal_distribution<double>()(random_); }
 
-  /// A round wall 4 m outside of a round path.
+  /// A circular wall 4 m outside a circular path.
   void build_ring(int points = 6000) {
     for (int i = 0; i < points; ++i) {
       const double angle = uniform(0.0, 2.0 * M_PI);
@@ -44,7 +44,7 @@ class WallFlight {
     }
   }
 
-  /// A straight wall 4 m beside a straight path, which looks the same every so many metres.
+  /// A straight wall 4 m beside a straight path, whose points repeat with that period (metres).
   void build_wall(double length, double period) {
     std::vector<Point> pattern;
     for (int i = 0; i < static_cast<int>(50.0 * period); ++i)
@@ -57,7 +57,7 @@ class WallFlight {
     }
   }
 
-  /// T_camera_world of a camera at that position that looks that way (radians from x, level).
+  /// T_camera_world of a camera at that position with that heading (radians from x, horizontal).
   static SE3 looking(const Eigen::Vector3d& position, double heading) {
     const Eigen::Vector3d ahead(std::cos(heading), std::sin(heading), 0.0);
     Eigen::Matrix3d R_world_camera;
@@ -65,15 +65,15 @@ class WallFlight {
     return SE3(R_world_camera, position).inverse();
   }
 
-  /// On the round path, so many radians along.
+  /// T_camera_world on the circular path at that angle (radians).
   static SE3 on_ring(double angle) {
     return looking({kRadius * std::cos(angle), kRadius * std::sin(angle), 0.0}, angle);
   }
 
-  /// On the straight path.
+  /// T_camera_world on the straight path.
   static SE3 on_wall(double x) { return looking({x, 0.0, 0.0}, M_PI / 2); }
 
-  /// What the camera sees from there. ids: takes which point each is.
+  /// The features seen from that pose. ids: receives the index of the point of each.
   std::shared_ptr<ObservedFrame> view(const SE3& T_camera_world, std::vector<std::size_t>* ids = nullptr) {
     auto frame = std::make_shared<ObservedFrame>();
     for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -99,8 +99,8 @@ class WallFlight {
     return frame;
   }
 
-  /// Flies on to there as odometry would have it, with a relative error of the step, and maps what is seen: a
-  /// point seen a moment ago is the same landmark, one seen long ago is taken for another.
+  /// Adds the keyframe of that true pose to the map, at the pose of an odometry with a relative error of
+  /// `drift` a step. A point seen in the last few keyframes keeps its landmark, others get a new one.
   KeyframeId fly_to(const SE3& T_camera_world, double drift, Map& map) {
     Vector6d error = Vector6d::Zero();
     if (!true_poses_.empty()) {
@@ -120,7 +120,7 @@ class WallFlight {
     return keyframe;
   }
 
-  /// Metres between where a keyframe is in the map and where it truly was.
+  /// Position error of a keyframe in the map, metres.
   double error_of(const Map& map, KeyframeId id) const {
     return (map.T_camera_world(id).inverse().translation() - true_poses_[id.index()].inverse().translation())
         .norm();
@@ -135,7 +135,7 @@ class WallFlight {
   const Camera& camera() const { return camera_; }
   std::size_t flown() const { return true_poses_.size(); }
 
-  static constexpr double kRadius = 12.0;  // metres, of the round path
+  static constexpr double kRadius = 12.0;  // metres, of the circular path
 
  private:
   void show(std::size_t point, KeyframeId keyframe, std::uint32_t index, Map& map) {
@@ -160,7 +160,7 @@ class WallFlight {
   MeasurementNoise noise_;
   std::vector<Point> points_;
   std::vector<SE3> true_poses_;                                        // T_camera_world, by keyframe
-  std::map<std::size_t, std::pair<LandmarkId, std::uint32_t>> known_;  // by point; and when it was last seen
+  std::map<std::size_t, std::pair<LandmarkId, std::uint32_t>> known_;  // by point; keyframe last seen
   std::uint32_t last_ = 0;
 };
 

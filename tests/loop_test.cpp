@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Loops on flights along walls, where the drift and the answer are known.
+// Loop closing on flights along walls with known drift and ground truth.
 #include <gtest/gtest.h>
 
-#include "roslam/loop/loop_closer.hpp"
-#include "roslam/loop/map_correction.hpp"
-#include "roslam/pipeline/options.hpp"
+#include "roslam/loop_closing/loop_closer.hpp"
+#include "roslam/loop_closing/map_correction.hpp"
+#include "roslam/slam/options.hpp"
+#include "roslam/slam/settings.hpp"
 #include "tests/loop_scene.hpp"
 
 namespace roslam::scene {
@@ -16,12 +17,12 @@ class LoopTest : public testing::Test {
   static constexpr double kDrift = 0.004;
 
   void use(const Options& options) {
-    std::vector<std::vector<Descriptor>> pictures;
-    for (int i = 0; i < 60; ++i) pictures.push_back(flight_.view(WallFlight::on_ring(0.11 * i))->descriptors);
-    for (int i = 0; i < 60; ++i) pictures.push_back(flight_.view(WallFlight::on_wall(2.0 * i))->descriptors);
+    std::vector<std::vector<Descriptor>> images;
+    for (int i = 0; i < 60; ++i) images.push_back(flight_.view(WallFlight::on_ring(0.11 * i))->descriptors);
+    for (int i = 0; i < 60; ++i) images.push_back(flight_.view(WallFlight::on_wall(2.0 * i))->descriptors);
     places_.emplace(
-        std::make_shared<const Vocabulary>(Vocabulary::train(pictures, {.branching = 10, .depth = 3})));
-    closer_.emplace(flight_.camera(), map_, *places_, mutex_, options.loop_settings());
+        std::make_shared<const Vocabulary>(Vocabulary::train(images, {.branching = 10, .depth = 3})));
+    closer_.emplace(flight_.camera(), map_, *places_, mutex_, loop_settings(options));
   }
 
   // Once around and a bit further.
@@ -33,7 +34,7 @@ class LoopTest : public testing::Test {
   WallFlight flight_{7};
   Map map_{{1.0F, 1.2F, 1.44F, 1.728F}};
   MapMutex mutex_;
-  std::optional<PlaceIndex> places_;
+  std::optional<KeyframeDatabase> places_;
   std::optional<LoopCloser> closer_;
 };
 
@@ -53,7 +54,7 @@ TEST_F(LoopTest, TakesTheDriftOut) {
   EXPECT_LT(flight_.error_of(map_, last), 0.1 * drifted);
   EXPECT_LT(flight_.mean_error(map_), 0.25 * drifted);
   EXPECT_EQ(map_.loops().size(), closer_->closed().size());
-  // What was mapped twice is one: keyframes on both sides see the same landmarks.
+  // Duplicate landmarks are fused: keyframes on both sides of the loop share landmarks.
   const auto neighbours = map_.covisible(closer_->closed().front().keyframe, 15);
   EXPECT_TRUE(std::any_of(neighbours.begin(), neighbours.end(),
                           [](const auto& neighbour) { return neighbour.first.value < 20; }));
@@ -67,13 +68,68 @@ TEST_F(LoopTest, StaysOutWhereNothingIsSeenTwice) {
   EXPECT_TRUE(closer_->closed().empty());
 }
 
-// The pictures match and geometry agrees; only that so much drift cannot be tells that it is another place.
-TEST_F(LoopTest, IsNotFooledByAWallThatRepeats) {
-  flight_.build_wall(120.0, 10.0);
-  use({});
-  for (double x = 0.0; x < 100.0; x += 0.6)
-    closer_->process(flight_.fly_to(WallFlight::on_wall(x), 0.001, map_));
+// A wall that looks the same every ten metres: images and geometry match at a place that it is not.
+class RepeatingWall : public LoopTest {
+ protected:
+  // Flies along it until a loop is confirmed, which is wrong, or to its end.
+  void fly_along(const Options& options) {
+    flight_.build_wall(120.0, 10.0);
+    use(options);
+    for (double x = 0.0; x < 100.0 && confirmed() == 0; x += 0.6)
+      closer_->process(flight_.fly_to(WallFlight::on_wall(x), 0.001, map_));
+  }
+
+  // Loops that passed every check of the detector, whether or not the pose graph refused them.
+  std::size_t confirmed() const { return closer_->closed().size() + closer_->refused(); }
+
+  static constexpr double kAnyMetres = 1e6;
+};
+
+// Perceptual aliasing: images and geometry match; only the implausible drift rejects the loop hypothesis.
+TEST_F(RepeatingWall, DoesNotFoolTheDetector) {
+  Options options;
+  options.loop.max_correction = kAnyMetres;
+  fly_along(options);
+  EXPECT_EQ(confirmed(), 0U);
+}
+
+TEST_F(RepeatingWall, WouldFoolTheDetectorIfAnyDriftWerePlausible) {
+  Options options;
+  options.loop.max_drift = 1.0;
+  options.loop.max_correction = kAnyMetres;
+  fly_along(options);
+  EXPECT_GE(confirmed(), 1U);
+  EXPECT_TRUE(closer_->closed().empty()) << "the pose graph refuses it still";
+}
+
+TEST_F(RepeatingWall, WouldBeClosedIfThePoseGraphRefusedNothingEither) {
+  Options options;
+  options.loop.max_drift = 1.0;
+  options.loop.max_correction = kAnyMetres;
+  options.loop_closer.max_error = 1e6;
+  fly_along(options);
+  EXPECT_GE(closer_->closed().size(), 1U);
+}
+
+// However long the path, and however much drift a share of it would allow.
+TEST_F(RepeatingWall, DoesNotFoolTheDetectorBeyondTheLargestCorrection) {
+  Options options;
+  options.loop.max_drift = 1.0;
+  options.loop.max_correction = 5.0;
+  fly_along(options);
+  EXPECT_EQ(confirmed(), 0U);
+}
+
+TEST_F(LoopTest, ALoopThatWouldCorrectMoreThanItMayIsNotClosed) {
+  flight_.build_ring();
+  Options options;
+  options.loop.max_correction = 0.1;  // TakesTheDriftOut has more to correct, and closes with the default
+  use(options);
+  fly_ring(2.0 * M_PI + 0.5);
+  const KeyframeId before_loop{static_cast<std::uint32_t>((2.0 * M_PI - 0.3) / kStep)};
+  EXPECT_GT(flight_.error_of(map_, before_loop), 0.3);
   EXPECT_TRUE(closer_->closed().empty());
+  EXPECT_EQ(closer_->refused(), 0U) << "it is no loop in the first place";
 }
 
 TEST_F(LoopTest, ClosesNoneWhereItsOptionsForbid) {
@@ -99,12 +155,12 @@ TEST_F(LoopTest, FindsWhereAViewIs) {
   flight_.build_ring();
   for (double angle = 0.0; angle < 1.0; angle += kStep) flight_.fly_to(WallFlight::on_ring(angle), 0.0, map_);
   const Options options;
-  PlaceCheck check(flight_.camera(), options.loop_settings().place);
+  GeometricVerifier check(flight_.camera(), loop_settings(options).place);
   const SE3 T_camera_world = WallFlight::on_ring(0.43);
   const auto match =
       check.match(map_, KeyframeId{8}, *flight_.view(T_camera_world), options.loop.min_inliers);
   ASSERT_TRUE(match);
-  EXPECT_EQ(match->place, KeyframeId{8});
+  EXPECT_EQ(match->matched_keyframe, KeyframeId{8});
   EXPECT_LT((match->T_camera_world * T_camera_world.inverse()).log().norm(), 0.02);
   EXPECT_GE(match->inliers, options.loop.min_inliers);
   EXPECT_FALSE(check.match(map_, KeyframeId{0}, *flight_.view(WallFlight::on_ring(3.0)), 20));
@@ -131,7 +187,7 @@ TEST_F(LoopTest, ACorrectionMovesWhatCameAfterItWasWorkedOut) {
   const std::size_t corrections = map_.corrections();
   correction.apply_to(map_);
   EXPECT_EQ(map_.corrections(), corrections + 1);
-  // Everything moved alike, so that no camera sees a difference.
+  // The whole map moved rigidly, so that relative poses do not change.
   for (const KeyframeId id : map_.keyframe_ids()) {
     const SE3 expected = poses[id.index()] * T_old_new;
     EXPECT_LT((map_.find(id)->T_camera_world * expected.inverse()).log().norm(), 1e-9);
@@ -168,11 +224,11 @@ TEST_F(LoopTest, RepeatsBitByBit) {
     flight.build_ring();
     Map map({1.0F, 1.2F, 1.44F, 1.728F});
     MapMutex mutex;
-    std::vector<std::vector<Descriptor>> pictures;
-    for (int i = 0; i < 60; ++i) pictures.push_back(flight.view(WallFlight::on_ring(0.11 * i))->descriptors);
-    PlaceIndex places(
-        std::make_shared<const Vocabulary>(Vocabulary::train(pictures, {.branching = 10, .depth = 3})));
-    LoopCloser closer(flight.camera(), map, places, mutex, Options().loop_settings());
+    std::vector<std::vector<Descriptor>> images;
+    for (int i = 0; i < 60; ++i) images.push_back(flight.view(WallFlight::on_ring(0.11 * i))->descriptors);
+    KeyframeDatabase places(
+        std::make_shared<const Vocabulary>(Vocabulary::train(images, {.branching = 10, .depth = 3})));
+    LoopCloser closer(flight.camera(), map, places, mutex, loop_settings(Options()));
     for (double angle = 0.0; angle < 2.0 * M_PI + 0.5; angle += kStep)
       closer.process(flight.fly_to(WallFlight::on_ring(angle), kDrift, map));
     EXPECT_GE(closer.closed().size(), 1U);

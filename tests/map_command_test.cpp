@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Maps on the command line: kept, gone on from, looked into, merged, exported; and what is refused.
+// Maps on the command line: saved, continued, inspected, merged, exported; and bad input.
 #include <gtest/gtest.h>
 
 #include <opencv2/imgcodecs.hpp>
@@ -64,8 +64,8 @@ TEST_F(MapCommand, AnotherFlightFindsItselfInTheMapAndLeavesItAlone) {
   const auto found = info(first / "map.roslam");
   EXPECT_EQ(found["keyframes"], report_of(first)["keyframes"]);
   EXPECT_EQ(found["landmarks"], report_of(first)["landmarks"]);
-  EXPECT_EQ(found["flights"], 1);
-  EXPECT_EQ(found["worlds"], 1);
+  EXPECT_EQ(found["sessions"], 1);
+  EXPECT_EQ(found["submaps"], 1);
 
   const std::string map_option = "--map '" + (first / "map.roslam").string() + "' ";
   const fs::path second = fly("second", 10, 40, map_option + "--localise-only");
@@ -73,7 +73,7 @@ TEST_F(MapCommand, AnotherFlightFindsItselfInTheMapAndLeavesItAlone) {
   EXPECT_FALSE(fs::exists(second / "map.roslam"));
   EXPECT_EQ(report_of(second)["frames"]["tracked"], 30);
   EXPECT_TRUE(report_of(second)["map"]["localise_only"]);
-  // In the coordinates of the map: where the first flight was at the same moments.
+  // In the frame of the map: the poses of the first session at the same times.
   const auto was = read_trajectory(first / "trajectory.txt").trajectory;
   const auto is = read_trajectory(second / "trajectory.txt").trajectory;
   ASSERT_EQ(is.size(), 30U);
@@ -82,16 +82,16 @@ TEST_F(MapCommand, AnotherFlightFindsItselfInTheMapAndLeavesItAlone) {
     EXPECT_LT((is[i].T_world_camera.inverse() * was[i + 10].T_world_camera).translation().norm(), 0.03) << i;
   }
 
-  // Into the folder of the map itself, too.
+  // The output folder may be that of the map.
   const fs::path same = fly("first", 10, 40, map_option + "--localise-only");
   EXPECT_EQ(content(same / "map.roslam"), bytes);
 
   const fs::path further = fly("further", 20, 60, map_option);
   EXPECT_EQ(content(first / "map.roslam"), bytes);
   const auto grown = info(further / "map.roslam");
-  EXPECT_EQ(grown["worlds"], 1);
+  EXPECT_EQ(grown["submaps"], 1);
   EXPECT_GT(grown["keyframes"], found["keyframes"]);
-  EXPECT_EQ(grown["flights"], 2);
+  EXPECT_EQ(grown["sessions"], 2);
 }
 
 TEST_F(MapCommand, MapsThatOverlapAreMergedAndExported) {
@@ -102,8 +102,8 @@ TEST_F(MapCommand, MapsThatOverlapAreMergedAndExported) {
       map("merge '" + first.string() + "' '" + second.string() + "' --quiet --out '" + both.string() + "'");
   ASSERT_EQ(merged.code, 0) << merged.error;
   const auto found = info(both);
-  EXPECT_EQ(found["worlds"], 1);
-  EXPECT_EQ(found["flights"], 2);
+  EXPECT_EQ(found["submaps"], 1);
+  EXPECT_EQ(found["sessions"], 2);
   EXPECT_EQ(found["keyframes"].get<int>(),
             info(first)["keyframes"].get<int>() + info(second)["keyframes"].get<int>());
 
@@ -125,7 +125,7 @@ TEST_F(MapCommand, WhatDoesNotFitTogetherIsRefused) {
                      both.string() + "'"),
                  {street.string(), mirrored.string(), "no place of one is recognised in the other"});
   EXPECT_FALSE(fs::exists(both));
-  std::ofstream(kept_ / "patient.yaml") << "tracker: {new_world_frames: 100}\n";
+  std::ofstream(kept_ / "patient.yaml") << "tracker: {new_submap_after_lost: 100}\n";
   const std::string elsewhere = "run '" + data_.string() +
                                 "' --quiet --camera simulated --dynamic none --config '" +
                                 (kept_ / "patient.yaml").string() + "' --out '" + (kept_ / "lost").string() +
@@ -133,9 +133,9 @@ TEST_F(MapCommand, WhatDoesNotFitTogetherIsRefused) {
   const std::string said = "no frame was recognised in the map";
   expect_refused(run_program(elsewhere, kept_), {data_.string(), said, "leave out --map"});
   expect_refused(run_program(elsewhere + " --localise-only", kept_), {said, "leave out --localise-only"});
-  EXPECT_FALSE(report_of(kept_ / "lost")["map"]["met"]);
+  EXPECT_FALSE(report_of(kept_ / "lost")["map"]["recognised"]);
   expect_refused(map("export '" + street.string() + "' --keyframes k.txt --flight 7"),
-                 {street.string(), "flight 7"});
+                 {street.string(), "session 7"});
   EXPECT_EQ(map("export '" + street.string() + "'").code, 2);
   EXPECT_EQ(map("merge '" + street.string() + "' --out x").code, 2);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/evaluation/map_error.hpp"
+#include "evaluation/map_error.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam {
+
+using namespace evaluation;
 namespace {
 
 // A camera before a wall 2 m away. With one pixel in two the truth is a grid of 80 x 60 points, 4 cm apart.
@@ -38,7 +40,7 @@ MapTruthFrame wall(double depth = 2.0) {
   return frame;
 }
 
-// Something walks and something is parked, both 1 m before the camera.
+// A walking and a parked object, both 1 m in front of the camera.
 MapTruthFrame wall_with_things() {
   MapTruthFrame frame = wall();
   frame.taken_depth = frame.background_depth.clone();
@@ -66,17 +68,17 @@ SurfacePoint at(int column, int row, double depth = 2.0) {
   return point;
 }
 
-Surface map_of_columns(int from, int to, int step = 1) {
-  Surface map;
+SurfaceMap map_of_columns(int from, int to, int step = 1) {
+  SurfaceMap map;
   for (int row = 0; row < 60; row += step)
     for (int column = from; column < to; column += step) map.points.push_back(at(column, row));
   return map;
 }
 
-Surface whole_map() { return map_of_columns(0, kColumns); }
+SurfaceMap whole_map() { return map_of_columns(0, kColumns); }
 
-// Points of the map on a thing of 1 m depth.
-std::size_t put_on(const cv::Rect& thing, Surface& map) {
+// Points of the map on an object at 1 m depth.
+std::size_t put_on(const cv::Rect& thing, SurfaceMap& map) {
   std::size_t count = 0;
   for (int y = thing.y; y < thing.y + thing.height; y += 2) {
     for (int x = thing.x; x < thing.x + thing.width; x += 2, ++count)
@@ -121,14 +123,14 @@ TEST(MapComparison, OnlyWhatTheReferenceHasIsMissing) {
 }
 
 TEST(MapComparison, PointsOffTheSurfaceAreInaccurateButNoGhosts) {
-  Surface map = whole_map();
+  SurfaceMap map = whole_map();
   for (int row = 0; row < 10; ++row) map.points.push_back(at(40, row, 1.9));
   for (int row = 0; row < 10; ++row) map.points.push_back(at(50, row, 1.5));  // nothing was there
   const MapError error = MapComparison(truth_of(wall_with_things())).error(map);
   EXPECT_DOUBLE_EQ(error.accuracy, kPoints / (kPoints + 20.0));
   EXPECT_EQ(error.ghost_points, 0U);
   EXPECT_EQ(error.completeness, 1.0);
-  Surface off;
+  SurfaceMap off;
   for (const auto& point : whole_map().points) off.points.push_back(point);
   for (auto& point : off.points) point.position.z() += 0.03F;
   EXPECT_NEAR(MapComparison(truth_of(wall())).error(off).median_distance, 0.03, 1e-5);
@@ -138,7 +140,7 @@ TEST(MapComparison, PointsOffTheSurfaceAreInaccurateButNoGhosts) {
 }
 
 TEST(MapComparison, TellsGhostsFromWhatIsParked) {
-  Surface map = whole_map();
+  SurfaceMap map = whole_map();
   const std::size_t ghosts = put_on(kMover, map);
   const MapComparison comparison(truth_of(wall_with_things()));
   const MapError with_ghosts = comparison.error(map);
@@ -156,7 +158,7 @@ TEST(MapComparison, TellsGhostsFromWhatIsParked) {
 
 TEST(MapComparison, CountsWhatLiesBetweenPointsWhereTrianglesAre) {
   const MapComparison comparison(truth_of(wall()));
-  Surface sparse = map_of_columns(0, kColumns, 2);
+  SurfaceMap sparse = map_of_columns(0, kColumns, 2);
   EXPECT_DOUBLE_EQ(comparison.error(sparse).completeness, 0.75);  // the middles of squares are 5.7 cm away
   const auto index = [](int column, int row) { return static_cast<std::uint32_t>(40 * row + column); };
   for (int row = 0; row + 1 < 30; ++row) {
@@ -171,19 +173,19 @@ TEST(MapComparison, CountsWhatLiesBetweenPointsWhereTrianglesAre) {
 }
 
 TEST(MapComparison, TellsErrorsApartByProvenance) {
-  Surface map = whole_map();
+  SurfaceMap map = whole_map();
   for (std::size_t i = 0; i < 1000; ++i) {
     map.points[i].provenance = Provenance::kReprojected;
     map.points[i].colour = kPaint + cv::Vec3b(6, 0, 0);
   }
   for (std::size_t i = 1000; i < 1500; ++i) {
-    map.points[i].provenance = Provenance::kInvented;
+    map.points[i].provenance = Provenance::kInpainted;
     map.points[i].colour = kPaint - cv::Vec3b(0, 30, 30);
     if (i < 1100) map.points[i].position.z() -= 0.1F;
   }
   const std::size_t ghosts = put_on(kMover, map);
   const MapError error = MapComparison(truth_of(wall_with_things())).error(map);
-  const auto& [measured, reprojected, invented] = error.by_provenance;
+  const auto& [measured, reprojected, inpainted] = error.by_provenance;
   EXPECT_EQ(measured.points, kPoints - 1500U + ghosts);
   EXPECT_EQ(measured.ghost_points, ghosts);
   EXPECT_EQ(measured.colour_error, 0.0);
@@ -191,15 +193,15 @@ TEST(MapComparison, TellsErrorsApartByProvenance) {
   EXPECT_EQ(reprojected.points, 1000U);
   EXPECT_EQ(reprojected.accuracy, 1.0);
   EXPECT_DOUBLE_EQ(reprojected.colour_error, 2.0);
-  EXPECT_EQ(invented.points, 500U);
-  EXPECT_DOUBLE_EQ(invented.accuracy, 0.8);
-  EXPECT_DOUBLE_EQ(invented.colour_error, 20.0);  // of the points that are where they should
-  EXPECT_EQ(invented.ghost_points, 0U);
+  EXPECT_EQ(inpainted.points, 500U);
+  EXPECT_DOUBLE_EQ(inpainted.accuracy, 0.8);
+  EXPECT_DOUBLE_EQ(inpainted.colour_error, 20.0);  // of the points that are where they should
+  EXPECT_EQ(inpainted.ghost_points, 0U);
   EXPECT_DOUBLE_EQ(error.colour_error, (1000 * 2.0 + 400 * 20.0) / (kPoints - 100));
 }
 
 TEST(MapComparison, AnEmptyMapMissesAllAndSaysNothingElse) {
-  const MapError error = MapComparison(truth_of(wall())).error(Surface());
+  const MapError error = MapComparison(truth_of(wall())).error(SurfaceMap());
   EXPECT_EQ(error.completeness, 0.0);
   EXPECT_EQ(error.holes, 1.0);
   EXPECT_EQ(error.f_score, 0.0);
@@ -237,11 +239,11 @@ TEST(MapTruth, KeepsWhatWasSeenFromNearest) {
   nearer.T_world_camera = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.0, 0.0, 1.0));
   truth.add(nearer);
   const MapComparison comparison(truth);
-  Surface middle;
+  SurfaceMap middle;
   middle.points = {at(40, 30)};
   middle.points[0].colour = cv::Vec3b(1, 2, 3);
   EXPECT_EQ(comparison.error(middle).colour_error, 0.0);
-  Surface edge;
+  SurfaceMap edge;
   edge.points = {at(2, 2)};  // which the nearer view does not see
   EXPECT_EQ(comparison.error(edge).colour_error, 0.0);
 }
@@ -255,7 +257,7 @@ TEST(MapTruth, MasksTellNoiseFromWhatMoves) {
   const auto by_depth = truth_of(frame).moving_points();
   EXPECT_EQ(by_depth.size(), known.size() + 100);
   EXPECT_FALSE(std::any_of(by_depth.begin(), by_depth.end(), [](const auto& point) { return point.rests; }));
-  // Before the sky any depth is something.
+  // In front of the sky any depth is an object.
   MapTruthFrame sky = wall_with_things();
   sky.background_depth.setTo(0.0);
   EXPECT_EQ(truth_of(sky).moving_points().size(), known.size());
@@ -285,7 +287,7 @@ TEST(MapReport, ASurfaceMovedBackFitsAgain) {
   Vector6d tangent;
   tangent << 1.0, 2.0, -0.5, 0.3, -0.2, 0.9;
   const SE3 motion = SE3::exp(tangent);
-  const Surface away = moved(whole_map(), motion);
+  const SurfaceMap away = moved(whole_map(), motion);
   EXPECT_NEAR(away.points[0].normal.dot((motion.rotation() * -Eigen::Vector3d::UnitZ()).cast<float>()), 1.0F,
               1e-5F);
   const MapComparison comparison(truth_of(wall()));
@@ -296,7 +298,7 @@ TEST(MapReport, ASurfaceMovedBackFitsAgain) {
 TEST(MapReport, HoldsEveryFigureAndNullWhereThereIsNone) {
   const MapComparison comparison(truth_of(wall()));
   const std::vector<EvaluatedMap> maps{{"good", 0.01, comparison.error(whole_map())},
-                                       {"empty", 0.02, comparison.error(Surface())}};
+                                       {"empty", 0.02, comparison.error(SurfaceMap())}};
   const auto json = nlohmann::json::parse(to_json(maps, {}, {}));
   EXPECT_EQ(json.at("tolerance_m"), 0.05);
   const auto& good = json.at("estimates").at(0);

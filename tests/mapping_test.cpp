@@ -247,10 +247,10 @@ TEST_F(MapTest, LandmarksNotFoundAgainGo) {
   LandmarkCuller culler{CullingOptions{}};
   const LandmarkId good = map_.add_landmark({0, 0, 2}, a, 0);
   const LandmarkId bad = map_.add_landmark({0, 0, 2}, a, 1);
-  map_.find(good)->predicted = 10;
-  map_.find(good)->found = 8;
-  map_.find(bad)->predicted = 10;
-  map_.find(bad)->found = 2;
+  map_.find(good)->times_visible = 10;
+  map_.find(good)->times_found = 8;
+  map_.find(bad)->times_visible = 10;
+  map_.find(bad)->times_found = 2;
   culler.watch({good, bad});
   EXPECT_EQ(culler.cull(map_, a), 1);
   EXPECT_NE(map_.find(good), nullptr);

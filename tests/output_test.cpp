@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Results that cannot be written, runs that are interrupted: what was computed is kept.
+// Output that cannot be written, interrupted runs: computed results are kept.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <spawn.h>
@@ -165,6 +165,37 @@ TEST_P(Interrupt, EndsSoonAndWritesWhatIsThere) {
   EXPECT_EQ(trajectory().size(), json["frames"]["tracked"].get<std::size_t>());
   EXPECT_EQ(read_trajectory(run_ / "groundtruth.txt").trajectory.size(),
             json["frames"]["processed"].get<std::size_t>());
+}
+
+// The second signal leaves out what takes long; what was computed is written all the same.
+TEST_P(Interrupt, ASecondOneStillWritesTrajectoryAndMap) {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0)
+    GTEST_SKIP() << "no pseudo terminal here";
+  const int program_end = open(ptsname(terminal), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  ASSERT_GE(program_end, 0);
+  const pid_t process = start(program_end);
+  char first = 0;
+  ASSERT_EQ(read(terminal, &first, 1), 1);
+  int status = -1;
+  pid_t ended = 0;
+  for (int signals = 0; signals < 2 && ended == 0; ++signals) {
+    kill(process, SIGINT);
+    // Two signals that are pending at once would be taken for one.
+    for (int i = 0; i < 20 && ended == 0; ++i) {
+      usleep(10000);
+      ended = waitpid(process, &status, WNOHANG);
+    }
+  }
+  if (ended == 0) ended = waitpid(process, &status, 0);
+  ASSERT_EQ(ended, process);
+  close(program_end);
+  close(terminal);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_EQ(report()["interrupted"], true);
+  EXPECT_FALSE(trajectory().empty());
+  EXPECT_TRUE(fs::exists(run_ / "map.roslam"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, Interrupt, testing::Values("--deterministic", "--real-time"),

@@ -11,7 +11,7 @@
 
 namespace roslam {
 
-/// What a program left behind.
+/// Exit code and output of a program.
 struct Outcome {
   int code = -1;  ///< exit code, -1 if it ended by a signal
   std::string out;

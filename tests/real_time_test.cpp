@@ -9,7 +9,7 @@ namespace {
 
 class RealTime : public Dataset {
  protected:
-  // The counts of frames, checked to add up.
+  // The frame counts; expects them to add up.
   nlohmann::json run_and_add_up(const std::string& arguments, std::size_t skipped) const {
     nlohmann::json frames = frames_of_run("--real-time " + arguments);
     const auto processed = frames["processed"].get<std::size_t>();

@@ -6,7 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "roslam/geometry/trajectory.hpp"
-#include "roslam/sources/simulated_source.hpp"
+#include "simulation/simulated_source.hpp"
 #include "tests/street.hpp"
 
 int main(int count, char** arguments) {
@@ -19,9 +19,9 @@ int main(int count, char** arguments) {
   const fs::path folder = arguments[1];
   fs::remove_all(folder);
   for (const char* name : {"rgb", "depth"}) fs::create_directories(folder / name);
-  roslam::SimulatorOptions options;
-  options.traffic = roslam::TrafficLevel::kNone;
-  roslam::Simulator simulator(options);
+  roslam::simulation::SimulatorOptions options;
+  options.traffic = roslam::simulation::TrafficLevel::kNone;
+  roslam::simulation::Simulator simulator(options);
   std::ofstream colours(folder / "rgb.txt");
   std::ofstream depths(folder / "depth.txt");
   roslam::Trajectory truth;

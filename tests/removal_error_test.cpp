@@ -1,23 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/evaluation/removal_error.hpp"
+#include "evaluation/removal_error.hpp"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam {
+
+using namespace evaluation;
 namespace {
 
 constexpr int kStep = 20;  // pixels from dot to dot
 constexpr int kColumns = 13;
 constexpr int kRows = 9;
-const cv::Size kPicture{320, 240};
+const cv::Size kImage{320, 240};
 
 // 13 x 9 dots at (30, 30), (50, 30) ...; each is one corner.
 cv::Mat dots() {
-  cv::Mat grey(kPicture, CV_8UC1, cv::Scalar(100));
+  cv::Mat grey(kImage, CV_8UC1, cv::Scalar(100));
   for (int row = 0; row < kRows; ++row) {
     for (int column = 0; column < kColumns; ++column) {
       const cv::Point dot(30 + kStep * column, 30 + kStep * row);
@@ -28,7 +30,7 @@ cv::Mat dots() {
   return grey;
 }
 
-cv::Mat nothing() { return cv::Mat::zeros(kPicture, CV_8UC1); }
+cv::Mat nothing() { return cv::Mat::zeros(kImage, CV_8UC1); }
 
 // Columns of pixels from begin up to end, without it.
 cv::Mat columns(int begin, int end) {
@@ -91,7 +93,7 @@ TEST(RemovalError, DilatesTheMaskAsTheRunDid) {
   EXPECT_DOUBLE_EQ(compared(truth, run, 10).actor_recall(), 51.0 / 101.0);
 }
 
-// A mask frees a part of the budget, which then goes to points elsewhere: no share may shrink by that.
+// A mask frees part of the feature budget, which is then spent elsewhere: shares must not depend on that.
 TEST(RemovalError, SharesAreOfThePointsWithoutAMask) {
   OrbOptions few = exact();
   few.features = 60;
@@ -137,8 +139,8 @@ TEST(RemovalError, LetsRestingThingsThroughWhereTheRunDid) {
   EXPECT_EQ(compared(truth, {{}, {}, CountedPoints{116, 0, 0}}).unlike_run, 1u);
 }
 
-// Extraction keeps some pixels off a mask; how many corners it removes there tells pictures apart that have
-// as many points as the budget allows.
+// The extractor keeps a margin around a mask; the number of corners removed there distinguishes images that
+// have all the points the budget allows.
 TEST(RemovalError, KnowsTheRunByItsPointsBesideTheMask) {
   OrbOptions options = exact();
   options.mask_margin = 12;  // pixels: from 60 to the dots at 70
@@ -152,7 +154,7 @@ TEST(RemovalError, KnowsTheRunByItsPointsBesideTheMask) {
 
 TEST(RemovalError, RefusesWhatDoesNotFit) {
   const cv::Mat small = cv::Mat::zeros(10, 10, CV_8UC1);
-  const cv::Mat wide = cv::Mat::zeros(kPicture, CV_16UC1);
+  const cv::Mat wide = cv::Mat::zeros(kImage, CV_16UC1);
   for (const cv::Mat& bad : {small, wide}) {
     EXPECT_THROW(compared({bad, {}}, {}), InputError);
     EXPECT_THROW(compared({nothing(), bad}, {}), InputError);
@@ -167,11 +169,11 @@ TEST(RemovalError, ReportsSharesAndWhatHasNone) {
   RemovalError error = compared({columns(0, 101), columns(200, 240)}, {columns(0, 60), {}, {}});
   error.without_truth = 3;
   const std::string table = to_markdown(error);
-  for (const char* words : {"survive: 50.0 %", "wrongly removed: 0.0 %", "1 frames\n", "| actors ",
-                            "within 10 pixels", "59.4 % of the actors", "3 frames left out"}) {
+  for (const char* words : {"actors kept: 50.0 %", "wrongly removed: 0.0 %", "1 frames\n", "| actors ",
+                            "within 10 pixels", "59.4 % of the actors", "3 frames skipped"}) {
     EXPECT_NE(table.find(words), std::string::npos) << words << "\n" << table;
   }
-  EXPECT_EQ(table.find("not as many"), std::string::npos) << table;
+  EXPECT_EQ(table.find("differs from the run"), std::string::npos) << table;
   const auto json = nlohmann::json::parse(to_json(error));
   EXPECT_EQ(json["actor_points"]["kept_share"], 0.5);
   EXPECT_EQ(json["static_points"]["kept"], 63);
@@ -183,7 +185,7 @@ TEST(RemovalError, ReportsSharesAndWhatHasNone) {
   EXPECT_EQ(json["interrupted"], false);
   const RemovalError empty = compared({nothing(), {}}, {});
   EXPECT_TRUE(nlohmann::json::parse(to_json(empty))["actor_points"]["kept_share"].is_null());
-  EXPECT_NE(to_markdown(empty).find("survive: -;"), std::string::npos) << to_markdown(empty);
+  EXPECT_NE(to_markdown(empty).find("actors kept: -;"), std::string::npos) << to_markdown(empty);
 }
 
 }  // namespace

@@ -6,9 +6,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
-#include "roslam/cloud/surface_file.hpp"
+#include "roslam/common/write_file.hpp"
+#include "roslam/dense/surface_file.hpp"
 #include "roslam/geometry/trajectory.hpp"
-#include "roslam/write_file.hpp"
 #include "tests/program.hpp"
 #include "tests/scratch.hpp"
 
@@ -19,7 +19,7 @@ class Render : public testing::Test {
  protected:
   void SetUp() override {
     make_folder(folder);
-    Surface surface;
+    SurfaceMap surface;
     surface.spacing = 0.1;
     for (int y = -20; y <= 20; ++y) {
       for (int x = -20; x <= 20; ++x) {
@@ -28,7 +28,7 @@ class Render : public testing::Test {
                                   {0.0F, 0.0F, 1.0F},
                                   {0, 0, 200},
                                   0,
-                                  is_invented ? Provenance::kInvented : Provenance::kMeasured});
+                                  is_invented ? Provenance::kInpainted : Provenance::kMeasured});
       }
     }
     write_surface_ply(folder / "dense.ply", surface, false);
@@ -43,7 +43,7 @@ class Render : public testing::Test {
   Outcome render(const std::string& arguments) const {
     return shell_in(folder, std::string(ROSLAM_PROGRAM) + " render " + arguments);
   }
-  cv::Mat picture(const std::string& name) const { return cv::imread((folder / name).string()); }
+  cv::Mat image(const std::string& name) const { return cv::imread((folder / name).string()); }
 
   template <typename Test>
   static int count(const cv::Mat& image, const Test& test) {
@@ -60,18 +60,20 @@ TEST_F(Render, DrawsEachViewInTheSizeAskedFor) {
   for (const std::string view : {"top", "front", "follow"}) {
     const Outcome outcome = render("dense.ply --view " + view + " --out " + view + ".png --size 300 200");
     ASSERT_EQ(outcome.code, 0) << outcome.error;
-    EXPECT_EQ(picture(view + ".png").size(), cv::Size(300, 200));
+    EXPECT_EQ(image(view + ".png").size(), cv::Size(300, 200));
     const auto is_drawn = [](const cv::Vec3b& colour) { return colour != cv::Vec3b(255, 255, 255); };
-    EXPECT_GT(count(picture(view + ".png"), is_drawn), 1000) << view;
+    EXPECT_GT(count(image(view + ".png"), is_drawn), 1000) << view;
   }
 }
 
 TEST_F(Render, LeavesOutWhatWasInvented) {
   ASSERT_EQ(render("dense.ply --out all.png --size 300 300 --colour provenance").code, 0);
-  ASSERT_EQ(render("dense.ply --out seen.png --size 300 300 --colour provenance --no-invented").code, 0);
+  ASSERT_EQ(render("dense.ply --out seen.png --size 300 300 --colour provenance --no-inpainted").code, 0);
+  ASSERT_EQ(render("dense.ply --out old.png --size 300 300 --colour provenance --no-invented").code, 0);
   const auto is_magenta = [](const cv::Vec3b& c) { return c[0] > c[1] + 50 && c[2] > c[1] + 50; };
-  EXPECT_GT(count(picture("all.png"), is_magenta), 10000);
-  EXPECT_EQ(count(picture("seen.png"), is_magenta), 0);
+  EXPECT_GT(count(image("all.png"), is_magenta), 10000);
+  EXPECT_EQ(count(image("seen.png"), is_magenta), 0);
+  EXPECT_EQ(count(image("old.png"), is_magenta), 0);  // by the flag's old name
 }
 
 TEST_F(Render, SaysWhatIsWrong) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/restoration/depth_completion.hpp"
 #include "tests/restoration_scene.hpp"
 
@@ -53,7 +53,7 @@ TEST(DepthCompletion, WhatWasRemovedDoesNotBleedIn) {
   const cv::Mat depth = plane({0.0, 0.0, 1.0}, 4.0);
   cv::Mat hole = box_hole({120, 80, 60, 80});
   cv::Mat seen = without(depth, hole);
-  // A mask that is three pixels too small leaves the thing's own depth along its border.
+  // A mask three pixels too small leaves depth of the object along its border.
   cv::Mat border = dilated(hole, 3) & ~hole;
   seen.setTo(1.0, border);
   const cv::Mat completed = completed_depth(seen, hole);
@@ -79,7 +79,7 @@ TEST(DepthCompletion, TheSkyStaysWithoutDepth) {
   EXPECT_LT(share_set(hole, completed > 0), 0.05);
 }
 
-TEST(DepthCompletion, HolesAtTheBorderAndOverAllOfThePicture) {
+TEST(DepthCompletion, HolesAtTheBorderAndOverAllOfTheImage) {
   const cv::Mat depth = plane({0.2, 0.0, 1.0}, 3.0);
   const cv::Mat corner = box_hole({0, 160, 100, 80});
   EXPECT_LT(depth_difference(depth, completed_depth(without(depth, corner), corner), corner), 0.02);

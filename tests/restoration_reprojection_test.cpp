@@ -4,9 +4,9 @@
 #include <limits>
 #include <memory>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/geometry/pixel_rays.hpp"
-#include "roslam/restoration/reprojection.hpp"
+#include "roslam/restoration/background_reprojection.hpp"
 #include "tests/restoration_scene.hpp"
 
 namespace roslam::scene {
@@ -15,28 +15,28 @@ namespace {
 // A target with a person before the room, and what other views know.
 class Reprojection : public testing::Test {
  protected:
-  roslam::View target() const { return taken(stage_, room({kPerson}), SE3(), 10.0); }
+  roslam::PosedImage target() const { return taken(stage_, room({kPerson}), SE3(), 10.0); }
   View truth() const { return stage_.show(room()); }
 
   // A view from elsewhere, with the person elsewhere.
-  roslam::View other(double x, double person, double timestamp) const {
+  roslam::PosedImage other(double x, double person, double timestamp) const {
     return taken(stage_, room({kPerson.shifted(person)}), turned(0.02 * x, {x, 0.0, 0.0}), timestamp);
   }
 
-  void add(const roslam::View& view) {
-    auto source = source_view(view, {});
+  void add(const roslam::PosedImage& view) {
+    auto source = prepare_source(view, {});
     ASSERT_TRUE(source);
-    sources_.push_back(std::make_unique<const SourceView>(std::move(*source)));
+    sources_.push_back(std::make_unique<const SourceImage>(std::move(*source)));
   }
 
-  ReprojectedArea fill(const roslam::View& view, const ReprojectionOptions& options = {}) const {
-    std::vector<const SourceView*> sources;
+  ReprojectedArea fill(const roslam::PosedImage& view, const ReprojectionOptions& options = {}) const {
+    std::vector<const SourceImage*> sources;
     for (const auto& source : sources_) sources.push_back(source.get());
     return BackgroundReprojection(stage_.camera(), options).fill(view, view.removed, sources);
   }
 
   Stage stage_;
-  std::vector<std::unique_ptr<const SourceView>> sources_;
+  std::vector<std::unique_ptr<const SourceImage>> sources_;
 };
 
 TEST_F(Reprojection, FillsAHoleWithWhatOtherViewsSaw) {
@@ -92,7 +92,7 @@ TEST_F(Reprojection, TakesTheLightOfTheTarget) {
   add(brighter);
   const cv::Mat colour = in_colour(truth().grey);
   const auto area = fill(target());
-  cv::Mat dark;  // not overexposed in the brighter picture
+  cv::Mat dark;  // not overexposed in the brighter image
   cv::inRange(colour, cv::Scalar::all(0), cv::Scalar::all(190), dark);
   EXPECT_LT(difference(colour, area.colour, area.filled & dark), 4.0);
 }
@@ -131,7 +131,7 @@ TEST_F(Reprojection, WorksForATargetWithoutDepth) {
   EXPECT_GT(share_set(view.removed, area.filled), 0.95);
 }
 
-TEST_F(Reprojection, FillsDistortedPictures) {
+TEST_F(Reprojection, FillsDistortedImages) {
   Camera camera = small_camera();
   camera.distortion = {0.12, -0.2, 0.002, -0.001, 0.0};
   // The scene as the distorting camera shows it, resampled from one with a wider view.
@@ -151,20 +151,20 @@ TEST_F(Reprojection, FillsDistortedPictures) {
     }
   }
   const auto taken_through = [&](const std::vector<Panel>& panels, const SE3& pose, double time) {
-    roslam::View view = taken(stage, panels, pose, time);
+    roslam::PosedImage view = taken(stage, panels, pose, time);
     cv::remap(view.colour, view.colour, map, {}, cv::INTER_LINEAR);
     cv::remap(view.depth, view.depth, map, {}, cv::INTER_NEAREST);
     cv::remap(view.removed, view.removed, map, {}, cv::INTER_NEAREST);
     return view;
   };
   const auto one =
-      source_view(taken_through(room({kPerson.shifted(0.8)}), looking_from(-0.1, 0.0, 0.0), 8.0), {});
+      prepare_source(taken_through(room({kPerson.shifted(0.8)}), looking_from(-0.1, 0.0, 0.0), 8.0), {});
   const auto two =
-      source_view(taken_through(room({kPerson.shifted(-0.9)}), looking_from(0.1, 0.0, 0.0), 12.0), {});
+      prepare_source(taken_through(room({kPerson.shifted(-0.9)}), looking_from(0.1, 0.0, 0.0), 12.0), {});
   ASSERT_TRUE(one && two);
   auto target = taken_through(room({kPerson}), SE3(), 10.0);
   target.depth.at<float>(5, 5) = std::numeric_limits<float>::quiet_NaN();
-  const std::vector<const SourceView*> sources{&*one, &*two};
+  const std::vector<const SourceImage*> sources{&*one, &*two};
   const auto area = BackgroundReprojection(camera, {}).fill(target, target.removed, sources);
   const auto truth = taken_through(room(), SE3(), 10.0);
   EXPECT_GT(share_set(target.removed, area.filled), 0.95);
@@ -190,13 +190,13 @@ TEST(PixelRays, PixelsComeBackThroughLensDistortion) {
 TEST_F(Reprojection, AViewWithoutPoseOrDepthIsNoSource) {
   auto view = other(0.1, 0.9, 11.0);
   view.depth.setTo(0);
-  EXPECT_FALSE(source_view(view, {}));
+  EXPECT_FALSE(prepare_source(view, {}));
   view = other(0.1, 0.9, 11.0);
   view.depth = cv::Mat();
-  EXPECT_FALSE(source_view(view, {}));
+  EXPECT_FALSE(prepare_source(view, {}));
   view = other(0.1, 0.9, 11.0);
   view.T_world_camera.reset();
-  EXPECT_FALSE(source_view(view, {}));
+  EXPECT_FALSE(prepare_source(view, {}));
 }
 
 TEST(ReprojectionOptions, NameTheFieldThatIsOutOfRange) {

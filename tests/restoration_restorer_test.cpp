@@ -3,16 +3,16 @@
 
 #include <memory>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "tests/restoration_scene.hpp"
 
 namespace roslam::scene {
 namespace {
 
-// Paints grey, and can fail.
+// Fills with grey, or fails.
 class GreyInpainter : public Inpainter {
  public:
-  cv::Mat paint(const cv::Mat& crop, const cv::Mat&, const cv::Rect&, Movable) override {
+  cv::Mat inpaint(const cv::Mat& crop, const cv::Mat&, const cv::Rect&, Movable) override {
     if (fails) throw ModelError("no network today");
     return cv::Mat(crop.size(), CV_8UC3, cv::Scalar::all(120));
   }
@@ -21,20 +21,21 @@ class GreyInpainter : public Inpainter {
 
 class Restorer : public testing::Test {
  protected:
-  roslam::View target() const { return taken(stage_, room({kPerson}), SE3(), 10.0); }
+  roslam::PosedImage target() const { return taken(stage_, room({kPerson}), SE3(), 10.0); }
 
   // All that the person hides, seen while they were elsewhere.
-  SourceView elsewhere(double person = 0.8, double x = -0.05) const {
-    return *source_view(taken(stage_, room({kPerson.shifted(person)}), looking_from(x, 0.0, 0.0), 8.0), {});
+  SourceImage elsewhere(double person = 0.8, double x = -0.05) const {
+    return *prepare_source(taken(stage_, room({kPerson.shifted(person)}), looking_from(x, 0.0, 0.0), 8.0),
+                           {});
   }
 
-  RestoredView restore(const roslam::View& view, const std::vector<const SourceView*>& sources,
-                       const StaticSceneRestorer::Settings& settings = {}) const {
+  RestoredImage restore(const roslam::PosedImage& view, const std::vector<const SourceImage*>& sources,
+                        const StaticSceneRestorer::Settings& settings = {}) const {
     return StaticSceneRestorer(stage_.camera(), settings, inpainter_)
         .restore(view, {{Movable::kPerson, {100, 20, 200, 200}}}, sources);
   }
 
-  static void expect_whole(const roslam::View& view, const RestoredView& restored) {
+  static void expect_whole(const roslam::PosedImage& view, const RestoredImage& restored) {
     const cv::Mat measured = restored.provenance == static_cast<double>(Provenance::kMeasured);
     EXPECT_EQ(cv::countNonZero(measured & (view.removed != 0)), 0);
     EXPECT_EQ(difference(restored.colour, view.colour, measured), 0.0);
@@ -42,7 +43,7 @@ class Restorer : public testing::Test {
       EXPECT_EQ(difference(restored.depth, view.depth, measured), 0.0);
     }
     EXPECT_EQ(restored.pixels_of(Provenance::kMeasured) + restored.pixels_of(Provenance::kReprojected) +
-                  restored.pixels_of(Provenance::kInvented),
+                  restored.pixels_of(Provenance::kInpainted),
               restored.colour.total());
   }
 
@@ -51,13 +52,13 @@ class Restorer : public testing::Test {
 };
 
 TEST_F(Restorer, TakesWhatWasSeenAndInventsTheRest) {
-  const SourceView source = elsewhere(0.25);  // the person still hides part of it
+  const SourceImage source = elsewhere(0.25);  // the person still hides part of it
   const auto view = target();
   const auto restored = restore(view, {&source});
   expect_whole(view, restored);
   const View truth = stage_.show(room());
   const cv::Mat seen = restored.provenance == static_cast<double>(Provenance::kReprojected);
-  const cv::Mat invented = restored.provenance == static_cast<double>(Provenance::kInvented);
+  const cv::Mat invented = restored.provenance == static_cast<double>(Provenance::kInpainted);
   EXPECT_GT(share_set(view.removed, seen), 0.3);
   EXPECT_GT(share_set(view.removed, invented), 0.1);
   EXPECT_LT(difference(in_colour(truth.grey), restored.colour, seen), 4.0);
@@ -68,11 +69,11 @@ TEST_F(Restorer, TakesWhatWasSeenAndInventsTheRest) {
   EXPECT_EQ(cv::countNonZero((restored.certainty > 0) & invented), 0);
 }
 
-TEST_F(Restorer, LeavesAPictureWithoutHolesAsItIs) {
+TEST_F(Restorer, LeavesAImageWithoutHolesAsItIs) {
   auto view = target();
   for (const cv::Mat& none : {cv::Mat(), cv::Mat(cv::Mat::zeros(view.colour.size(), CV_8UC1))}) {
     view.removed = none;
-    const SourceView source = elsewhere();
+    const SourceImage source = elsewhere();
     const auto restored = restore(view, {&source});
     EXPECT_EQ(cv::norm(restored.colour, view.colour, cv::NORM_INF), 0.0);
     EXPECT_EQ(cv::norm(restored.depth, view.depth, cv::NORM_INF), 0.0);
@@ -80,13 +81,13 @@ TEST_F(Restorer, LeavesAPictureWithoutHolesAsItIs) {
   }
 }
 
-TEST_F(Restorer, FillsAPictureOfWhichNothingIsLeft) {
+TEST_F(Restorer, FillsAImageOfWhichNothingIsLeft) {
   auto view = target();
   view.removed = cv::Mat(view.colour.size(), CV_8UC1, cv::Scalar(255));
   const auto without = restore(view, {});
-  EXPECT_EQ(without.pixels_of(Provenance::kInvented), view.colour.total());
+  EXPECT_EQ(without.pixels_of(Provenance::kInpainted), view.colour.total());
   EXPECT_EQ(cv::countNonZero(without.depth), 0);
-  const SourceView source = elsewhere();
+  const SourceImage source = elsewhere();
   const auto with = restore(view, {&source});
   EXPECT_GT(with.pixels_of(Provenance::kReprojected), view.colour.total() / 2);
 }
@@ -100,7 +101,8 @@ TEST_F(Restorer, DoesWithoutAnyDepth) {
   view.depth = cv::Mat::zeros(view.colour.size(), CV_32FC1);
   const auto blind = restore(view, {});
   EXPECT_EQ(cv::countNonZero(blind.depth), 0);
-  EXPECT_EQ(blind.pixels_of(Provenance::kInvented), static_cast<std::size_t>(cv::countNonZero(view.removed)));
+  EXPECT_EQ(blind.pixels_of(Provenance::kInpainted),
+            static_cast<std::size_t>(cv::countNonZero(view.removed)));
 }
 
 TEST_F(Restorer, DoesWithoutANetwork) {
@@ -114,12 +116,12 @@ TEST_F(Restorer, DoesWithoutANetwork) {
 }
 
 TEST_F(Restorer, CanBeToldToDoOneThingAlone) {
-  const SourceView source = elsewhere(0.25);
+  const SourceImage source = elsewhere(0.25);
   const auto view = target();
   StaticSceneRestorer::Settings settings;
-  settings.restoration.invent = false;
+  settings.restoration.inpaint = false;
   const auto seen_only = restore(view, {&source}, settings);
-  const cv::Mat open = seen_only.provenance == static_cast<double>(Provenance::kInvented);
+  const cv::Mat open = seen_only.provenance == static_cast<double>(Provenance::kInpainted);
   EXPECT_GT(cv::countNonZero(open), 0);
   EXPECT_EQ(cv::norm(seen_only.colour, cv::NORM_INF, open), 0.0);
   settings.restoration = {.reproject = false};
@@ -127,7 +129,7 @@ TEST_F(Restorer, CanBeToldToDoOneThingAlone) {
 }
 
 TEST_F(Restorer, TheSameInputGivesTheSameBytes) {
-  const SourceView source = elsewhere(0.25);
+  const SourceImage source = elsewhere(0.25);
   const auto view = target();
   const auto first = restore(view, {&source}), second = restore(view, {&source});
   EXPECT_EQ(cv::norm(first.colour, second.colour, cv::NORM_INF), 0.0);

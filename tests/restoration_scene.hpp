@@ -5,14 +5,14 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "roslam/removal/mask_refinement.hpp"
+#include "roslam/dynamic_objects/mask_refinement.hpp"
 #include "roslam/restoration/static_scene_restorer.hpp"
-#include "tests/removal_scene.hpp"
+#include "tests/dynamic_scene.hpp"
 
-/// Views of the scenes of removal_scene.hpp with a thing in them that is removed.
+/// Images of the scenes of dynamic_scene.hpp with an object in them that is removed.
 namespace roslam::scene {
 
-/// Hides parts of wall, shelf and bench.
+/// Occludes parts of wall, shelf and bench.
 constexpr Panel kPerson{-0.3, -0.6, 0.2, 0.9, 1.3};
 
 inline cv::Mat in_colour(const cv::Mat& grey) {
@@ -22,15 +22,15 @@ inline cv::Mat in_colour(const cv::Mat& grey) {
   return colour;
 }
 
-/// What a camera sees of panels; the thing, if one of them is kThing, is removed with a margin.
-inline roslam::View taken(const Stage& stage, const std::vector<Panel>& panels, const SE3& T_camera_world,
-                          double timestamp) {
+/// Renders the panels; the object kThing, if there is one, is removed with a margin.
+inline roslam::PosedImage taken(const Stage& stage, const std::vector<Panel>& panels,
+                                const SE3& T_camera_world, double timestamp) {
   const View seen = stage.show(panels, T_camera_world);
   return {timestamp, T_camera_world.inverse(), in_colour(seen.grey), seen.depth,
           dilated(seen.shows(kThing), 4)};
 }
 
-/// Mean absolute difference of pictures where a mask is set, grey levels.
+/// Mean absolute difference of images where a mask is set, grey levels.
 inline double difference(const cv::Mat& a, const cv::Mat& b, const cv::Mat& where) {
   return cv::norm(a, b, cv::NORM_L1, where) / (a.channels() * std::max(1, cv::countNonZero(where)));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Restoration in flight: beside the tracker, never in its way.
-#include "roslam/pipeline/restoration_worker.hpp"
+// Restoration in its own thread: it never blocks the tracker.
+#include "roslam/slam/restoration_worker.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,16 +8,16 @@
 #include <mutex>
 #include <thread>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "tests/restoration_scene.hpp"
 
 namespace roslam::scene {
 namespace {
 
-// Waits until it is let go, as a slow network; or throws.
+// Blocks until released, as a slow network does; or throws.
 class SlowInpainter : public Inpainter {
  public:
-  cv::Mat paint(const cv::Mat& crop, const cv::Mat&, const cv::Rect&, Movable) override {
+  cv::Mat inpaint(const cv::Mat& crop, const cv::Mat&, const cv::Rect&, Movable) override {
     std::unique_lock lock(mutex_);
     is_busy_ = true;
     changed_.notify_all();
@@ -54,9 +54,9 @@ class Worker : public testing::Test {
         stage_.camera(), options, mode, inpainter_,
         [this](const std::vector<KeyframeId>& ids) {
           const std::scoped_lock lock(mutex_);
-          std::vector<KeyframePlace> places;
+          std::vector<KeyframePose> places;
           for (const KeyframeId id : ids)
-            places.push_back({worlds_.count(id.value) > 0 ? worlds_.at(id.value) : WorldId{0},
+            places.push_back({submaps_.count(id.value) > 0 ? submaps_.at(id.value) : SubmapId{0},
                               shift_ * places_.at(id.value)});
           return places;
         },
@@ -80,20 +80,20 @@ class Worker : public testing::Test {
     frame.timestamp = 0.5 * id;
     frame.colour = in_colour(seen.grey);
     frame.depth = seen.depth;
-    Removal removal;
+    DynamicObjects dynamic_objects;
     MovableObject object;
     ASSERT_TRUE(take_mask(object, seen.shows(kThing)));
     object.kind = Movable::kPerson;
-    removal.objects = {object};
+    dynamic_objects.objects = {object};
     {
       const std::scoped_lock lock(mutex_);
       places_[id] = T_camera_world.inverse();
     }
-    worker_->submit(KeyframeId{id}, frame, removal);
+    worker_->submit(KeyframeId{id}, frame, dynamic_objects);
   }
 
   double seen_share(std::size_t which) const {
-    const RestoredView& view = restored_.at(which).view;
+    const RestoredImage& view = restored_.at(which).view;
     const auto hole = view.colour.total() - view.pixels_of(Provenance::kMeasured);
     return static_cast<double>(view.pixels_of(Provenance::kReprojected)) / static_cast<double>(hole);
   }
@@ -102,7 +102,7 @@ class Worker : public testing::Test {
   std::shared_ptr<SlowInpainter> inpainter_ = std::make_shared<SlowInpainter>();
   std::mutex mutex_;
   std::map<unsigned, SE3> places_;
-  std::map<unsigned, WorldId> worlds_;
+  std::map<unsigned, SubmapId> submaps_;
   SE3 shift_;  // of all keyframes, as a correction of the map makes it
   std::vector<RestoredKeyframe> restored_;
   bool taker_fails_ = false;
@@ -133,11 +133,11 @@ TEST_F(Worker, FollowsCorrectionsOfTheMap) {
 
 TEST_F(Worker, TakesNothingFromAnotherWorld) {
   start(Mode::kDeterministic);
-  worlds_[1] = WorldId{1};
+  submaps_[1] = SubmapId{1};
   submit(1, 0.8);
   submit(2, 0.0);
   EXPECT_EQ(seen_share(1), 0.0);
-  worlds_[1] = WorldId{0};  // the worlds have met
+  submaps_[1] = SubmapId{0};  // the worlds have met
   submit(3, 0.0);
   EXPECT_GT(seen_share(2), 0.9);
 }

@@ -121,7 +121,7 @@ TEST_F(RestoreCommand, IsNearerToTheTruthThanClassicMethods) {
   const json error = evaluated("--truth truth --estimate compared");
   EXPECT_GT(error.at("psnr_db").get<double>(), classic + 3.0);
   EXPECT_LT(error.at("depth_error_reprojected").get<double>(), 0.03);
-  // The same by names and with masks of one's own, as for pictures of other origin.
+  // The same by names and with masks of one's own, as for images of other origin.
   const json by_name = evaluated("--truth truth/rgb --estimate compared/rgb --masks compared/provenance");
   EXPECT_EQ(by_name.at("psnr_db"), error.at("psnr_db"));
   EXPECT_TRUE(by_name.at("depth_error_reprojected").is_null());
@@ -172,10 +172,10 @@ TEST_F(RestoreCommand, RestoresKeyframesInFlight) {
   const json report = json::parse(content(folder_ / "live/restored/restoration.json"));
   EXPECT_GT(report.at("frames").get<int>(), 0);
   EXPECT_EQ(report.at("dropped"), 0);
-  std::size_t pictures = 0;
+  std::size_t images = 0;
   for (const auto& file : fs::directory_iterator(folder_ / "live/restored/rgb"))
-    pictures += !cv::imread(file.path().string()).empty();
-  EXPECT_EQ(pictures, report.at("frames"));
+    images += !cv::imread(file.path().string()).empty();
+  EXPECT_EQ(images, report.at("frames"));
   const auto without = roslam(run + "plain");
   EXPECT_EQ(content(folder_ / "live/trajectory.txt"), content(folder_ / "plain/trajectory.txt"));
   EXPECT_TRUE(fs::exists(folder_ / "live/restored"));
@@ -304,7 +304,7 @@ TEST_F(RestoreCommand, EvaluationRefusesWhatTellsNothing) {
   expect_refused(roslam(evaluate + "--truth truth --estimate scored --masks nowhere"), {"nowhere"});
   fs::create_directories(folder_ / "other");
   cv::imwrite((folder_ / "other/x.png").string(), cv::Mat(240, 320, CV_8UC3, cv::Scalar::all(1)));
-  expect_refused(roslam(evaluate + "--truth other --estimate scored"), {"no picture of the time or name"});
+  expect_refused(roslam(evaluate + "--truth other --estimate scored"), {"no image of the time or name"});
   expect_refused(roslam(evaluate + "--truth truth --estimate scored --masks truth/instances"),
                  {"no mask has a hole"});
 }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A map that was saved and loaded serves as the one that was never out of memory.
+// A map saved and loaded behaves like the one in memory.
 #include <gtest/gtest.h>
 
-#include "roslam/atlas/map_file.hpp"
-#include "roslam/pipeline/slam.hpp"
-#include "roslam/removal/removal_options.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/dynamic_objects/dynamic_object_options.hpp"
+#include "roslam/map_io/map_file.hpp"
+#include "roslam/slam/slam.hpp"
 #include "tests/street_frames.hpp"
 
 namespace roslam::street {
@@ -14,7 +15,7 @@ class SavedMapTest : public Street {
  protected:
   static std::unique_ptr<Slam> slam_with(bool localises_only = false) {
     Options options;
-    options.removal = *removal_from("none", options.removal);
+    options.dynamic_objects = *options_of_mode("none", options.dynamic_objects);
     options.keyframes.enabled = !localises_only;
     return std::make_unique<Slam>(
         *camera_preset("simulated"), options, Mode::kDeterministic, nullptr,
@@ -24,7 +25,7 @@ class SavedMapTest : public Street {
   static void feed(Slam& slam, std::size_t begin, std::size_t end) {
     for (const Frame& frame : *frames_) {
       if (frame.index < begin || frame.index >= end) continue;
-      ASSERT_TRUE(slam.process(frame));
+      ASSERT_TRUE(slam.process(frame).is_used());
     }
     slam.finish();
   }
@@ -48,15 +49,15 @@ TEST_F(SavedMapTest, TrackingAndMappingGoOnBitByBitAsInTheMapThatWasNeverSaved) 
   save_map(file_, first->snapshot());
   for (const bool localises_only : {false, true}) {
     const auto kept = slam_with(localises_only);
-    kept->continue_from(first->snapshot());
+    kept->load_map(first->snapshot());
     feed(*kept, 30, kEnd);
     const auto loaded = slam_with(localises_only);
-    loaded->continue_from(load_map(file_));
+    loaded->load_map(load_map(file_));
     feed(*loaded, 30, kEnd);
     EXPECT_EQ(kept->trajectory().size(), kBeforeGap - 30 + kEnd - kGapEnd);
     expect_same(*kept, *loaded);
     for (const BagOfWords& words : kept->snapshot().words) EXPECT_FALSE(words.empty());
-    EXPECT_TRUE(kept->has_met_map());
+    EXPECT_TRUE(kept->found_in_loaded_map());
     if (!localises_only) continue;
     EXPECT_EQ(kept->map().keyframe_count(), first->map().keyframe_count());
   }
@@ -64,7 +65,7 @@ TEST_F(SavedMapTest, TrackingAndMappingGoOnBitByBitAsInTheMapThatWasNeverSaved) 
 
 TEST_F(SavedMapTest, WithoutAMapThereIsNothingToLocaliseIn) {
   const auto slam = slam_with(true);
-  EXPECT_THROW(slam->process(frames_->front()), OptionsError);
+  EXPECT_EQ(slam->process(frames_->front()).rejected, RejectReason::kNoMapToLocaliseIn);
 }
 
 TEST_F(SavedMapTest, AMapOfAnotherCameraIsRefused) {
@@ -72,7 +73,7 @@ TEST_F(SavedMapTest, AMapOfAnotherCameraIsRefused) {
   feed(*first, 0, 5);
   SavedMap saved = first->snapshot();
   saved.camera.cx += 1.0;
-  EXPECT_THROW(slam_with()->continue_from(std::move(saved)), InputError);
+  EXPECT_THROW(slam_with()->load_map(std::move(saved)), InputError);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 
 namespace roslam {
 
-/// A path that no other test uses, in this or another process: tests run in parallel.
+/// A temporary path unique to the test and the process, as tests run in parallel.
 inline std::filesystem::path scratch_path(const std::string& extension = "") {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
   std::string name =

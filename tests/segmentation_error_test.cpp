@@ -6,11 +6,13 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
-#include "roslam/error.hpp"
-#include "roslam/evaluation/segmentation_error.hpp"
+#include "evaluation/segmentation_error.hpp"
+#include "roslam/common/error.hpp"
 #include "tests/scratch.hpp"
 
 namespace roslam {
+
+using namespace evaluation;
 namespace {
 
 namespace fs = std::filesystem;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A segmenter that misbehaves costs labels, not the flight; what went wrong is counted under one name.
+// A failing segmenter costs labels, not tracking; its faults are counted by name.
 #include <gtest/gtest.h>
 
 #include <condition_variable>
@@ -8,9 +8,9 @@
 #include <mutex>
 #include <utility>
 
-#include "roslam/error.hpp"
-#include "roslam/pipeline/run.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/semantics/segmenter.hpp"
+#include "roslam/slam/run.hpp"
 #include "tests/street.hpp"
 
 namespace roslam::street {
@@ -45,7 +45,7 @@ class SegmenterFaults : public testing::TestWithParam<Mode> {
     Options options;
     options.threads.segmentation_timeout = timeout;
     Slam slam(source.camera(), options, GetParam(), segmenter);
-    const RunSummary summary = run(source, slam);
+    const RunSummary summary = run_slam(source, slam);
     ASSERT_FALSE(summary.failure);
     EXPECT_GT(slam.frames(), 10U);
     EXPECT_GE(slam.trajectory().size(), slam.frames() - 1);

@@ -7,9 +7,9 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/semantics/label_set.hpp"
-#include "roslam/semantics/onnx_picture_size.hpp"
+#include "roslam/semantics/onnx_image_size.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
 #include "roslam/semantics/score_labels.hpp"
 #include "tests/program.hpp"
@@ -186,7 +186,7 @@ TEST(PspnetSegmenter, GivesTheSameLabelsAgain) {
   EXPECT_EQ(first.confidence, again.confidence);
 }
 
-TEST(PspnetSegmenter, TakesPicturesOfAnySizeAndKind) {
+TEST(PspnetSegmenter, TakesImagesOfAnySizeAndKind) {
   PspnetSegmenter segmenter(test_model("colours.onnx"), {}, InferenceBackend::kOpenCv);
   const cv::Mat white(1, 1, CV_8UC1, cv::Scalar(255));
   EXPECT_EQ(segmenter.segment(white).labels.at<std::uint8_t>(0, 0), 13);
@@ -199,7 +199,7 @@ TEST(PspnetSegmenter, TakesPicturesOfAnySizeAndKind) {
   EXPECT_EQ(cv::countNonZero(thin.labels != 0), 0);
 }
 
-TEST(PspnetSegmenter, RefusesWhatIsNoPicture) {
+TEST(PspnetSegmenter, RefusesWhatIsNoImage) {
   PspnetSegmenter segmenter(test_model("colours.onnx"), {}, InferenceBackend::kOpenCv);
   EXPECT_THROW(segmenter.segment({}), InputError);
   EXPECT_THROW(segmenter.segment(cv::Mat(48, 64, CV_32FC3)), InputError);
@@ -230,7 +230,7 @@ TEST(BadModel, IsNamedWithWhatWasExpected) {
   const std::string channels = reason_to_refuse(test_model("grey.onnx"));
   EXPECT_NE(channels.find("grey.onnx: the network cannot be run"), std::string::npos) << channels;
   const std::string numbers = reason_to_refuse(test_model("nan.onnx"));
-  EXPECT_NE(numbers.find("nan.onnx: gives scores that are no numbers"), std::string::npos) << numbers;
+  EXPECT_NE(numbers.find("nan.onnx: gives scores that are not finite"), std::string::npos) << numbers;
 }
 
 TEST(BadModel, DamagedFilesAreRefusedAtAnyLength) {
@@ -251,9 +251,9 @@ TEST(BadModel, TheOnnxRuntimeBackendIsMissedClearlyWhereItWasNotBuilt) {
   EXPECT_NE(reason.find("no ONNX Runtime"), std::string::npos) << reason;
 }
 
-TEST(OnnxPictureSize, IsLeftOpenInPlaceAndNothingElseChanges) {
+TEST(OnnxImageSize, IsLeftOpenInPlaceAndNothingElseChanges) {
   const std::string before = content(test_model("colours.onnx"));
-  const std::string after = with_open_picture_size(before);
+  const std::string after = with_open_image_size(before);
   ASSERT_EQ(after.size(), before.size());
   // 288 and 384 of the input: two dimensions of three bytes each. Those of the output have one byte and stay.
   std::size_t changed = 0;
@@ -262,9 +262,9 @@ TEST(OnnxPictureSize, IsLeftOpenInPlaceAndNothingElseChanges) {
   EXPECT_NE(after.find(std::string("\x12\x01h")), std::string::npos);
   EXPECT_NE(after.find(std::string("\x12\x01i")), std::string::npos);
   for (std::size_t length = 0; length < before.size(); length += 13) {
-    EXPECT_EQ(with_open_picture_size(before.substr(0, length)).size(), length);
+    EXPECT_EQ(with_open_image_size(before.substr(0, length)).size(), length);
   }
-  EXPECT_EQ(with_open_picture_size("no network"), "no network");
+  EXPECT_EQ(with_open_image_size("no network"), "no network");
 }
 
 TEST(OnnxRuntime, GivesTheLabelsOfOpenCv) {

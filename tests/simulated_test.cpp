@@ -12,12 +12,14 @@
 #include <set>
 #include <sstream>
 
-#include "roslam/error.hpp"
-#include "roslam/sources/depth_noise.hpp"
-#include "roslam/sources/simulated_source.hpp"
+#include "roslam/common/error.hpp"
+#include "simulation/depth_noise.hpp"
+#include "simulation/simulated_source.hpp"
 #include "tests/scratch.hpp"
 
 namespace roslam {
+
+using namespace simulation;
 namespace {
 
 namespace fs = std::filesystem;
@@ -141,7 +143,7 @@ TEST(Simulator, DepthAgreesWithThePoses) {
       }
     }
     EXPECT_GT(compared, 20000U);
-    // What is left: edges, where the four pixels belong to different things, and what has come into view.
+    // The rest: edges, where the four pixels belong to different objects, and newly visible surfaces.
     EXPECT_GT(static_cast<double>(agree) / static_cast<double>(compared), 0.93) << "frame " << i;
   }
 }
@@ -166,9 +168,9 @@ TEST(Simulator, BackgroundIsTheViewWithoutMovables) {
       if (view.frame.colour.at<cv::Vec3b>(y, x) != view.background_colour.at<cv::Vec3b>(y, x)) ++shadowed;
     }
   }
-  // Shadows of what moves are gone as well, and so are its traces in the pixels along its edges.
+  // Shadows of movable objects are removed as well, and so is their share in antialiased edge pixels.
   EXPECT_LT(static_cast<double>(shadowed) / static_cast<double>(outside), 0.2);
-  // Whatever drives there, behind it is the same street.
+  // The background does not depend on the traffic.
   EXPECT_TRUE(same_bytes(view.background_depth, still.background_depth));
   cv::Mat difference;
   cv::absdiff(view.background_colour, still.background_colour, difference);
@@ -215,7 +217,7 @@ TEST(Simulator, WithoutTrafficOnlyParkedCarsAreLeft) {
   EXPECT_GT(cars, 10000);
 }
 
-TEST(Simulator, CornersCoverThePicture) {
+TEST(Simulator, CornersCoverTheImage) {
   Simulator simulator(options_for(FlightPath::kStreet, TrafficLevel::kNone));
   for (std::size_t i = 0; i < simulator.size(); i += 50) {
     std::vector<cv::KeyPoint> corners;

@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <condition_variable>
 #include <filesystem>
+#include <mutex>
 
-#include "roslam/error.hpp"
-#include "roslam/evaluation/trajectory_error.hpp"
-#include "roslam/pipeline/run.hpp"
-#include "roslam/pipeline/slam.hpp"
-#include "roslam/sources/simulated_source.hpp"
-#include "roslam/sources/tum_source.hpp"
+#include "evaluation/trajectory_error.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/sensors/tum_source.hpp"
+#include "roslam/slam/run.hpp"
+#include "roslam/slam/slam.hpp"
+#include "simulation/simulated_source.hpp"
 
 namespace roslam {
+
+using namespace evaluation;
+using namespace simulation;
 namespace {
 
 struct Flight {
@@ -22,7 +28,7 @@ struct Flight {
 
 Flight fly(FrameSource& source, const Trajectory& truth_file = {}) {
   Slam slam(source.camera());
-  const RunSummary summary = run(source, slam);
+  const RunSummary summary = run_slam(source, slam);
   const Trajectory& truth = truth_file.empty() ? summary.truth : truth_file;
   const TrajectoryError error = evaluate_trajectory(truth, slam.trajectory());
   return {error.ate.rmse, error.path_length, slam.frames(), slam.trajectory().size()};
@@ -101,9 +107,15 @@ class RecordedSource : public FrameSource {
 TEST(Slam, RealTimeModeAccountsForEveryFrame) {
   RecordedSource source(40);
   Slam slam(source.camera(), {}, Mode::kRealTime);
-  const RunSummary summary = run(source, slam);
+  const RunSummary summary = run_slam(source, slam);
   EXPECT_EQ(slam.frames() + summary.dropped, 40U);
-  EXPECT_EQ(slam.trajectory().size(), slam.frames());
+  // On a busy machine so many frames may be dropped that tracking is lost; each frame still has its state.
+  std::size_t with_state = 0;
+  for (const auto& [state, count] : slam.frames_by_state()) with_state += count;
+  EXPECT_EQ(with_state, slam.frames());
+  const auto tracked = slam.frames_by_state().find(TrackingState::kTracking);
+  ASSERT_NE(tracked, slam.frames_by_state().end());
+  EXPECT_EQ(slam.trajectory().size(), tracked->second);
   EXPECT_GT(summary.wall_seconds, 39.0 / 30.0 - 0.01)
       << "frames must not come earlier than their timestamps say";
   EXPECT_LT(evaluate_trajectory(summary.truth, slam.trajectory()).ate.rmse, 0.05);
@@ -118,11 +130,79 @@ TEST(Slam, StopsWhenAskedAndKeepsWhatThereIs) {
     const auto stop_after_ten = [&](const Frame&, const FrameResult& frame) {
       if (frame.index >= 9) stop.request_stop();
     };
-    const RunSummary summary = run(source, slam, stop_after_ten, stop.get_token());
+    const RunSummary summary = run_slam(source, slam, stop_after_ten, stop.get_token());
     EXPECT_TRUE(summary.interrupted);
     EXPECT_LE(slam.frames(), 12U);
     EXPECT_EQ(slam.trajectory().size(), slam.frames());
   }
+}
+
+// Restores nothing: waits until it is told to go on, as a network on a slow computer.
+class SlowInpainter {
+ public:
+  void wait() {
+    std::unique_lock lock(mutex_);
+    ++waiting_;
+    changed_.notify_all();
+    changed_.wait_for(lock, std::chrono::milliseconds(300), [&] { return is_released_; });
+  }
+  void release() {
+    const std::scoped_lock lock(mutex_);
+    is_released_ = true;
+    changed_.notify_all();
+  }
+  int calls() {
+    const std::scoped_lock lock(mutex_);
+    return waiting_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int waiting_ = 0;
+  bool is_released_ = false;
+};
+
+// Keyframes that wait are discarded by the destructor and by cancel(), and processed by finish().
+TEST(Slam, DiscardsQueuesUnlessItIsFinished) {
+  RecordedSource source(40);
+  Options options;
+  options.keyframes.min_overlap = 0.99;  // many keyframes
+  options.restoration.queue = 100;
+  for (const bool finishes : {false, true}) {
+    source.rewind();
+    SlowInpainter slow;
+    int keyframes = 0;
+    {
+      Slam slam(source.camera(), options, Mode::kRealTime);
+      slam.enable_restoration(nullptr, [&](const RestoredKeyframe&) { slow.wait(); });
+      while (const auto frame = source.next()) keyframes += slam.process(*frame).is_keyframe ? 1 : 0;
+      ASSERT_GT(keyframes, 3);
+      if (finishes) {
+        slow.release();
+        slam.finish();
+      }
+    }
+    EXPECT_EQ(slow.calls() == keyframes, finishes) << slow.calls() << " of " << keyframes;
+  }
+}
+
+TEST(Slam, FinishReturnsSoonOnceItIsCancelled) {
+  RecordedSource source(40);
+  Options options;
+  options.keyframes.min_overlap = 0.99;
+  options.restoration.queue = 100;
+  SlowInpainter slow;
+  Slam slam(source.camera(), options, Mode::kRealTime);
+  slam.enable_restoration(nullptr, [&](const RestoredKeyframe&) { slow.wait(); });
+  int keyframes = 0;
+  while (const auto frame = source.next()) keyframes += slam.process(*frame).is_keyframe ? 1 : 0;
+  const auto before = std::chrono::steady_clock::now();
+  slam.cancel();
+  slam.finish();
+  EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(1));
+  EXPECT_LT(slow.calls(), keyframes);
+  EXPECT_EQ(slam.trajectory().size(), slam.frames()) << "what was computed stays";
 }
 
 TEST(Slam, RefusesAbsurdCalibrationAndOptions) {
@@ -141,8 +221,8 @@ TEST(Slam, WaitsForDepthBeforeItStarts) {
   Slam slam(simulator.camera());
   Frame blind = simulator.render(0).frame;
   blind.depth.release();
-  EXPECT_EQ(slam.process(blind)->state, TrackingState::kInitialising);
-  EXPECT_EQ(slam.process(simulator.render(1).frame)->state, TrackingState::kTracking);
+  EXPECT_EQ(slam.process(blind).state, TrackingState::kInitialising);
+  EXPECT_EQ(slam.process(simulator.render(1).frame).state, TrackingState::kTracking);
   EXPECT_EQ(slam.trajectory().size(), 1U);
 }
 
@@ -153,7 +233,7 @@ TEST(Slam, UsesNothingUnderTheMask) {
   const Frame frame = simulator.render(0).frame;
   cv::Mat mask = cv::Mat::zeros(frame.colour.size(), CV_8UC1);
   mask.colRange(0, 320) = 255;
-  ASSERT_TRUE(slam.process(frame, mask)->is_keyframe);
+  ASSERT_TRUE(slam.process(frame, mask).is_keyframe);
   ASSERT_GT(slam.map().landmark_count(), 100U);
   for (const Eigen::Vector2f& pixel : slam.map().find(KeyframeId{0})->view->pixels)
     EXPECT_GT(pixel.x(), 320.0F);

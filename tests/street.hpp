@@ -17,13 +17,13 @@
 #include <vector>
 
 #include "roslam/geometry/trajectory.hpp"
-#include "roslam/sources/tum_source.hpp"
+#include "roslam/sensors/tum_source.hpp"
 #include "tests/program.hpp"
 #include "tests/scratch.hpp"
 
 /// Tests on a short flight along the simulated street without traffic. The program record_street renders it
-/// once for all of them (a CTest fixture), since that takes longer than the tests themselves: frames 0 to 59
-/// and, after a gap, 85 to 99, at 30 a second.
+/// once for all tests (a CTest fixture), since that takes longer than the tests: frames 0 to 59 and, after a
+/// gap, 85 to 99, at 30 a second.
 namespace roslam::street {
 
 namespace fs = std::filesystem;
@@ -35,7 +35,7 @@ constexpr std::size_t kEnd = 100;
 
 inline double time_of(std::size_t frame) { return std::round(1e6 * static_cast<double>(frame) / 30.0) / 1e6; }
 
-/// All frames with their true poses; index and time tell which frame of the flight each is.
+/// All frames with their true poses; index and time are those in the flight.
 inline std::vector<Frame> frames() {
   TumSource source(kFolder, *camera_preset("simulated"));
   const Trajectory truth = read_trajectory(kFolder / "groundtruth.txt").trajectory;
@@ -49,7 +49,7 @@ inline std::vector<Frame> frames() {
 }
 
 inline void put(const fs::path& file, const std::string& bytes) {
-  fs::remove_all(file);  // what is there may be a link to the recorded image
+  fs::remove_all(file);  // an existing file may be a link to the recorded image
   std::ofstream(file, std::ios::binary) << bytes;
 }
 
@@ -68,7 +68,7 @@ inline Outcome run_program(const std::string& arguments, const fs::path& scratch
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, to.empty() ? content(out) : "", content(error)};
 }
 
-/// Exit code 1 and one line on stderr that holds all these words.
+/// Expects exit code 1 and one line on stderr that contains all these words.
 inline void expect_refused(const Outcome& outcome, const std::vector<std::string>& words) {
   EXPECT_EQ(outcome.code, 1) << outcome.error;
   EXPECT_EQ(outcome.out, "");
@@ -77,8 +77,8 @@ inline void expect_refused(const Outcome& outcome, const std::vector<std::string
     EXPECT_NE(outcome.error.find(word), std::string::npos) << word << ": " << outcome.error;
 }
 
-/// A copy of the first frames of the street in the TUM format, for a test to damage. Images may be replaced
-/// by put() and removed, lists are written by write_lists().
+/// A copy of the first frames of the street in the TUM format, for a test to damage. put() replaces images,
+/// write_lists() writes the lists.
 class Dataset : public testing::Test {
  protected:
   struct Line {
@@ -126,7 +126,7 @@ class Dataset : public testing::Test {
                        scratch_);
   }
 
-  /// Runs, expects success and gives the counts of frames in run.json.
+  /// Runs, expects success and returns the frame counts of run.json.
   nlohmann::json frames_of_run(const std::string& arguments = "",
                                const std::string& camera = "simulated") const {
     const Outcome outcome = run(arguments, camera);

@@ -8,7 +8,7 @@
 
 namespace roslam::street {
 
-/// Tests that feed frames of the street to the library, altered or not. They are read once for all cases.
+/// Tests that pass frames of the street, altered or not, to the library. They are read once for all cases.
 class Street : public testing::Test {
  protected:
   static void SetUpTestSuite() { frames_ = std::make_unique<std::vector<Frame>>(frames()); }
@@ -23,7 +23,7 @@ class Street : public testing::Test {
     return frame;
   }
 
-  // Frames of the flight from begin to end, with blank ones where the flight has none or for [gap, gap_end).
+  // Frames of the flight up to end, with blank ones for [gap, gap_end).
   static std::vector<Frame> with_blank(std::size_t gap, std::size_t gap_end, std::size_t end,
                                        const cv::Scalar& colour) {
     std::vector<Frame> sequence;
@@ -37,7 +37,7 @@ class Street : public testing::Test {
     return sequence;
   }
 
-  // Where the camera of a frame truly is, in the world of the first frame's estimate.
+  // True T_world_camera of a frame, in the world frame of the first frame's estimate.
   static SE3 truth(const Frame& frame, const SE3& first_estimate) {
     return first_estimate * frames_->front().T_world_camera->inverse() * *frame.T_world_camera;
   }

@@ -3,10 +3,10 @@
 
 #include <random>
 
-#include "roslam/error.hpp"
-#include "roslam/geometry/pose_optimiser.hpp"
-#include "roslam/geometry/reprojection.hpp"
-#include "roslam/tracking/projection_matcher.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/estimation/measurement_model.hpp"
+#include "roslam/estimation/pose_optimiser.hpp"
+#include "roslam/matching/projection_matcher.hpp"
 
 namespace roslam {
 namespace {
@@ -42,7 +42,7 @@ TEST(ReprojectionError, IsZeroAtTheTruthAndOneSigmaOff) {
   EXPECT_NEAR((ReprojectionError{camera, shifted}.error(point)).x(), -1.0, 1e-4);
 }
 
-// What fits many noisy depths best must not lie nearer or farther than the truth: it would shrink the world.
+// The best fit to many noisy depths must be unbiased: a bias would scale the map.
 TEST(ReprojectionError, NoisyDisparitiesAverageToTheTrueDepth) {
   const Camera camera;
   const MeasurementNoise noise;
@@ -180,20 +180,54 @@ TEST(ConsistentRotation, WrapsAround) {
   for (const bool kept : keep) EXPECT_TRUE(kept);
 }
 
-TEST(MatchDescriptors, MatchesEachPointOnce) {
-  std::mt19937_64 generator(9);
-  ObservedFrame a;
-  for (int i = 0; i < 40; ++i) a.descriptors.push_back({generator(), generator(), generator(), generator()});
-  a.pixels.resize(40);
-  ObservedFrame b = a;
-  std::reverse(b.descriptors.begin(), b.descriptors.end());
-  std::vector<std::uint32_t> from{3, 5, 39};
-  const auto pairs = match_descriptors(a, from, b, {});
-  ASSERT_EQ(pairs.size(), 3U);
-  for (const auto& [in_a, in_b] : pairs) EXPECT_EQ(in_b, 39 - in_a);
-  b.descriptors[0] = b.descriptors[1];  // two equally good: ambiguous, so no match
-  b.descriptors[39 - 3] = b.descriptors[39 - 5];
-  EXPECT_LT(match_descriptors(a, from, b, {}).size(), 3U);
+class MatchDescriptors : public testing::Test {
+ protected:
+  MatchDescriptors() {
+    std::mt19937_64 generator(9);
+    for (int i = 0; i < 40; ++i)
+      a_.descriptors.push_back({generator(), generator(), generator(), generator()});
+    a_.pixels.resize(40);
+    b_ = a_;
+    std::reverse(b_.descriptors.begin(), b_.descriptors.end());
+  }
+
+  static Descriptor with_flipped(Descriptor descriptor, int bits) {
+    descriptor[0] ^= (std::uint64_t{1} << bits) - 1;
+    return descriptor;
+  }
+
+  using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
+  ObservedFrame a_;
+  ObservedFrame b_;  // the same points in reverse order
+};
+
+TEST_F(MatchDescriptors, FindsEachPointAgain) {
+  EXPECT_EQ(match_descriptors(a_, {3, 5, 39}, b_, {}), (Pairs{{39, 0}, {5, 34}, {3, 36}}));
+}
+
+TEST_F(MatchDescriptors, LeavesOutWhatIsAmbiguous) {
+  // Two about equally good.
+  b_.descriptors[39 - 3] = with_flipped(a_.descriptors[3], 10);
+  b_.descriptors[0] = with_flipped(a_.descriptors[3], 11);
+  EXPECT_EQ(match_descriptors(a_, {3, 5}, b_, {}), (Pairs{{5, 34}}));
+  b_.descriptors[0] = with_flipped(a_.descriptors[3], 13);
+  EXPECT_EQ(match_descriptors(a_, {3, 5}, b_, {}), (Pairs{{5, 34}, {3, 36}}));
+}
+
+TEST_F(MatchDescriptors, LeavesOutWhatIsThereTwice) {
+  b_.descriptors[0] = b_.descriptors[39 - 3];  // two that fit exactly
+  EXPECT_EQ(match_descriptors(a_, {3, 5}, b_, {}), (Pairs{{5, 34}}));
+}
+
+TEST_F(MatchDescriptors, MatchesEachPointOnce) {
+  // Two points of a compete for one of b.
+  a_.descriptors[3] = with_flipped(b_.descriptors[34], 20);
+  a_.descriptors[5] = with_flipped(b_.descriptors[34], 10);
+  ASSERT_EQ(match_descriptors(a_, {3}, b_, {}), (Pairs{{3, 34}}));
+  ASSERT_EQ(match_descriptors(a_, {5}, b_, {}), (Pairs{{5, 34}}));
+  EXPECT_EQ(match_descriptors(a_, {3, 5, 39}, b_, {}), (Pairs{{39, 0}, {5, 34}}));
+  EXPECT_EQ(match_descriptors(a_, {39, 5, 3}, b_, {}), (Pairs{{39, 0}, {5, 34}}));
 }
 
 }  // namespace

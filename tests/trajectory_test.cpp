@@ -10,7 +10,7 @@
 #include <random>
 #include <sstream>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/geometry/alignment.hpp"
 #include "tests/scratch.hpp"
 
@@ -235,7 +235,7 @@ TEST(Alignment, AgreesWithHornsQuaternionMethodOnNoisyPoints) {
                        Eigen::Vector3d(normal(generator), normal(generator), normal(generator)));
     }
     for (const auto model : {AlignmentModel::kRigid, AlignmentModel::kSimilarity}) {
-      const auto found = align(source, target, model);
+      const auto found = align_points(source, target, model);
       const Alignment expected = horn(source, target, model == AlignmentModel::kSimilarity);
       ASSERT_TRUE(found);
       EXPECT_TRUE(found->unique_rotation);
@@ -249,7 +249,7 @@ TEST(Alignment, NoSmallChangeIsBetter) {
   std::mt19937 generator(6);
   const Points source = random_points(generator, 12);
   const Points target = random_points(generator, 12);  // unrelated: a reflection would often fit better
-  const auto found = align(source, target, AlignmentModel::kSimilarity);
+  const auto found = align_points(source, target, AlignmentModel::kSimilarity);
   ASSERT_TRUE(found);
   const double least = cost(*found, source, target);
   for (int k = 0; k < 7; ++k) {
@@ -268,18 +268,18 @@ TEST(Alignment, NoSmallChangeIsBetter) {
 TEST(Alignment, FitsAStraightLineAndAHoverThoughNotUniquely) {
   const Points line{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {5, 0, 0}};
   const Points turned{{1, 1, 1}, {1, 2, 1}, {1, 3, 1}, {1, 6, 1}};
-  const auto found = align(line, turned, AlignmentModel::kRigid);
+  const auto found = align_points(line, turned, AlignmentModel::kRigid);
   ASSERT_TRUE(found);
   EXPECT_FALSE(found->unique_rotation);
   EXPECT_LT(cost(*found, line, turned), 1e-20);
 
   const Points spot(4, Eigen::Vector3d(7, 8, 9));
-  const auto hover = align(spot, turned, AlignmentModel::kRigid);
+  const auto hover = align_points(spot, turned, AlignmentModel::kRigid);
   ASSERT_TRUE(hover);
   EXPECT_FALSE(hover->unique_rotation);
   EXPECT_LT((*hover * spot[0] - mean(turned)).norm(), 1e-12);
-  EXPECT_FALSE(align(spot, turned, AlignmentModel::kSimilarity));
-  EXPECT_FALSE(align(turned, spot, AlignmentModel::kSimilarity));
+  EXPECT_FALSE(align_points(spot, turned, AlignmentModel::kSimilarity));
+  EXPECT_FALSE(align_points(turned, spot, AlignmentModel::kSimilarity));
 }
 
 TEST(Alignment, HasNoAnswerForTooFewUnequalOrUnusablePoints) {
@@ -287,10 +287,10 @@ TEST(Alignment, HasNoAnswerForTooFewUnequalOrUnusablePoints) {
   const Points three{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   Points unusable = three;
   unusable[1].y() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(align(two, two, AlignmentModel::kRigid));
-  EXPECT_FALSE(align(two, three, AlignmentModel::kRigid));
-  EXPECT_FALSE(align(three, unusable, AlignmentModel::kRigid));
-  EXPECT_FALSE(align({}, {}, AlignmentModel::kRigid));
+  EXPECT_FALSE(align_points(two, two, AlignmentModel::kRigid));
+  EXPECT_FALSE(align_points(two, three, AlignmentModel::kRigid));
+  EXPECT_FALSE(align_points(three, unusable, AlignmentModel::kRigid));
+  EXPECT_FALSE(align_points({}, {}, AlignmentModel::kRigid));
 }
 
 // A camera that flies straight ahead and rolls: positions alone leave the turn about the path open.

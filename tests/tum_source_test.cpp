@@ -6,9 +6,9 @@
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 
-#include "roslam/error.hpp"
-#include "roslam/sources/image_file.hpp"
-#include "roslam/sources/tum_source.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/sensors/image_file.hpp"
+#include "roslam/sensors/tum_source.hpp"
 #include "tests/scratch.hpp"
 
 namespace roslam {
@@ -24,7 +24,7 @@ std::vector<TimedFile> at(const std::vector<double>& times) {
 
 std::vector<int> pairs(const std::vector<double>& colour, const std::vector<double>& depth,
                        double tolerance = 0.02) {
-  return associate(at(colour), at(depth), tolerance);
+  return associate_by_time(at(colour), at(depth), tolerance);
 }
 
 TEST(Associate, TakesTheNearestInTime) {

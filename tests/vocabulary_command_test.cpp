@@ -9,9 +9,9 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "roslam/error.hpp"
-#include "roslam/places/vocabulary.hpp"
-#include "roslam/write_file.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/write_file.hpp"
+#include "roslam/place_recognition/vocabulary.hpp"
 #include "tests/program.hpp"
 #include "tests/scratch.hpp"
 
@@ -29,7 +29,7 @@ class VocabularyCommand : public testing::Test {
     return shell_in(folder_, std::string(ROSLAM_PROGRAM) + " vocabulary train " + arguments);
   }
 
-  void put_pictures(unsigned count) {
+  void put_images(unsigned count) {
     for (unsigned seed = 0; seed < count; ++seed) {
       std::mt19937 random(seed);
       cv::Mat image(240, 320, CV_8UC3, cv::Scalar::all(128));
@@ -53,12 +53,12 @@ class VocabularyCommand : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(VocabularyCommand, MakesTheSameFileFromTheSamePictures) {
-  put_pictures(6);
+TEST_F(VocabularyCommand, MakesTheSameFileFromTheSameImages) {
+  put_images(6);
   const Outcome outcome = train("in --out words --branching 5 --depth 3 --json --quiet");
   ASSERT_EQ(outcome.code, 0) << outcome.error;
   const auto summary = nlohmann::json::parse(outcome.out);
-  EXPECT_EQ(summary["pictures"], 6);
+  EXPECT_EQ(summary["images"], 6);
   EXPECT_GT(summary["descriptors"], 1000);
   EXPECT_EQ(Vocabulary::load(folder_ / "words").words(), summary["words"]);
   EXPECT_LE(summary["words"], 125);
@@ -74,7 +74,7 @@ TEST_F(VocabularyCommand, NamesWhatIsWrongWithItsInput) {
   cv::imwrite((folder_ / "in/grey.png").string(), cv::Mat(240, 320, CV_8UC3, cv::Scalar::all(90)));
   expect_one_error(train("in --out words --quiet"), "too few corners");
   EXPECT_FALSE(fs::exists(folder_ / "words"));
-  put_pictures(2);
+  put_images(2);
   expect_one_error(train("in --out no/such/folder/words --quiet"), "no/such/folder/words");
   expect_one_error(train("in --out words --branching 60 --depth 8 --quiet"), "million");
   expect_one_error(train("in --out words --branching 1"), "--branching", 2);
@@ -90,7 +90,7 @@ TEST_F(VocabularyCommand, RunRefusesAVocabularyThatIsNone) {
   expect_one_error(run("--vocabulary missing"), "missing: no such file");
   write_file(folder_ / "text", "these are words, but not the right ones");
   expect_one_error(run("--vocabulary text"), "text: not a vocabulary of RO-SLAM");
-  put_pictures(2);
+  put_images(2);
   ASSERT_EQ(train("in --out words --branching 5 --depth 2 --quiet").code, 0);
   std::string damaged = content(folder_ / "words");
   damaged[damaged.size() / 2] = static_cast<char>(damaged[damaged.size() / 2] ^ 1);

@@ -7,17 +7,20 @@
 #include <string>
 #include <vector>
 
-#include "apps/roslam/commands.hpp"
 #include "apps/roslam/composition.hpp"
-#include "apps/roslam/interrupt.hpp"
-#include "apps/roslam/output.hpp"
-#include "roslam/error.hpp"
-#include "roslam/evaluation/markdown_table.hpp"
-#include "roslam/sources/composer.hpp"
-#include "roslam/sources/tum_source.hpp"
-#include "roslam/write_file.hpp"
+#include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/interrupt.hpp"
+#include "apps/roslam/support/output.hpp"
+#include "evaluation/plots/markdown_table.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/write_file.hpp"
+#include "roslam/sensors/tum_source.hpp"
+#include "simulation/composition/composer.hpp"
 
 namespace roslam::app {
+
+using namespace evaluation;
+using namespace simulation;
 namespace {
 
 namespace fs = std::filesystem;
@@ -29,34 +32,34 @@ struct ComposeArguments {
   fs::path people;
   ComposerOptions options;
   std::array<double, 2> distance{1.3, 2.4};
-  std::array<double, 3> up{};  // 0 0 0: as the camera has it
+  std::array<double, 3> up{};  // 0 0 0: estimated from the sequence
   bool json = false;
 };
 
 constexpr const char* kHelp =
-    R"(Put walking people into a recorded static sequence, with everything known about them.
-
-How well a SLAM system copes with people can be measured exactly only where their pixels and what they hide are known.
-This takes a TUM RGB-D folder without people and pictures of people, and writes a folder that `roslam run` takes as any
-other. It is a composite, not a recording: report figures on it as such.
+    R"(The pixels of the people and the background behind them are known exactly, which no recording offers.
+Reads a TUM RGB-D folder of a static scene with groundtruth.txt, and images of people. Writes a TUM RGB-D
+folder that `roslam run` accepts. The result is a composite, not a recording: say so with any figures of it.
 
 Example:
   roslam compose rgbd_dataset_freiburg1_rpy --camera tum-fr1 --people people --up 0 0 1 --out rpy_people
   roslam run rpy_people --camera rpy_people/camera.yaml --out rpy_people_run
 
-Each picture of the people shows one standing person from head to feet: NAME.jpg or NAME.png with NAME_mask.png,
-8 bit, 255 = person.
+Each image in the folder of --people shows one standing person from head to feet: NAME.jpg or NAME.png, with
+NAME_mask.png (8 bit, 255 = person).
 
-Writes to the folder, images named after their time in seconds:
+Writes to the folder of --out; images are named after their timestamp in seconds:
   rgb/ rgb.txt            colour
-  depth/ depth.txt        depth, 16 bit, 5000 a metre, 0 = unknown
-  groundtruth.txt         camera poses: time, position (m), quaternion x y z w
-  camera.yaml             the camera, for --camera
-  labels/                 11 (person) where an actor is seen, 255 (unknown) elsewhere
-  instances/              which actor each pixel shows, 16 bit, from 1; 0 = none
-  background.txt          time and colour image of each frame without people, as a path from the folder
-  background_depth.txt    the same of its depth image, in the units of the sequence
-  composition.json        who walks, and all options in effect)";
+  depth/ depth.txt        depth, 16 bit, --depth-units per metre, 0 = unknown
+  groundtruth.txt         camera poses: timestamp (s), position (m), quaternion x y z w
+  camera.yaml             camera parameters, for --camera of roslam run
+  labels/                 8 bit: 11 (person) on actors, 255 (unknown) elsewhere
+  instances/              16 bit: number of the actor, from 1; 0 = none
+  background.txt          timestamp and colour image of each frame without people, relative to the folder
+  background_depth.txt    the same for the depth images, in the depth units of the input
+  composition.json        the actors and all options in effect
+
+Exit code: 0 success, 1 an error in the input, 2 wrong usage.)";
 
 std::vector<PersonCutout> read_people(const ComposeArguments& arguments) {
   if (arguments.options.actors == 0) return {};
@@ -108,19 +111,19 @@ Json summary_json(const ComposeArguments& arguments, const Composer& composer, c
 void print_summary(const ComposeArguments& arguments, const Composition& made) {
   std::cout << "wrote " << made.times.size() << " frames to " << arguments.settings.out.string()
             << (made.interrupted ? ", interrupted" : "") << "; actors cover " << fixed(100.0 * made.mean(), 1)
-            << " % of the picture on average, " << fixed(100.0 * made.most(), 1) << " % at most\n";
+            << " % of the image on average, " << fixed(100.0 * made.most(), 1) << " % at most\n";
   for (const auto& [reason, count] : made.skipped) std::cout << "skipped " << count << ": " << reason << "\n";
 }
 
 void warn(const ComposeArguments& arguments, const Composition& made) {
   if (arguments.options.actors > 0 && made.most() == 0.0) {
     std::cerr
-        << "note: no actor is ever seen: whatever stands in the view is nearer; give a smaller --distance\n";
+        << "note: no actor is ever seen: the scene is nearer than the actors; give a smaller --distance\n";
   }
   if (made.too_far > 0) {
     std::cerr << "note: " << made.too_far << " pixels are farther than "
               << fixed(65535.0 / arguments.settings.depth_units_per_metre, 1)
-              << " m, for which there is no room in the depth images; a smaller --depth-units has it\n";
+              << " m, the largest value of a 16-bit depth image; give a smaller --depth-units\n";
   }
 }
 
@@ -151,7 +154,7 @@ void compose(ComposeArguments arguments) {
   write_file(arguments.settings.out / "composition.json",
              summary.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   if (arguments.json) {
-    summary["out"] = arguments.settings.out.string();  // not in the file, which tells nothing of its place
+    summary["out"] = arguments.settings.out.string();  // not in the file: it would differ by folder
     std::cout << summary.dump(-1, ' ', false, Json::error_handler_t::replace) << "\n";
   } else {
     print_summary(arguments, made);
@@ -161,22 +164,22 @@ void compose(ComposeArguments arguments) {
 }
 
 void add_placement_options(CLI::App& command, ComposeArguments& arguments) {
-  command.add_option("--distance", arguments.distance, "How far in front of the camera people walk, metres")
+  command
+      .add_option("--distance", arguments.distance, "Distance of the people in front of the camera, metres")
       ->type_name("MIN MAX")
       ->capture_default_str();
-  command.add_option("--span", arguments.options.span, "How far they walk to each side, metres")
+  command.add_option("--span", arguments.options.span, "Distance they walk to each side, metres")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
   command
       .add_option("--camera-height", arguments.options.camera_height,
-                  "Height of the camera above the floor, on average, metres")
+                  "Mean height of the camera above the floor, metres")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
   command
-      .add_option(
-          "--up", arguments.up,
-          "Which way is up in the world of groundtruth.txt, such as 0 0 1; default: where floors and tables "
-          "face, or else what the camera's pictures have up")
+      .add_option("--up", arguments.up,
+                  "Up direction in the world frame of groundtruth.txt, such as 0 0 1; default: the normal of "
+                  "floors and tables, or else the mean up direction of the images")
       ->type_name("X Y Z");
 }
 
@@ -184,34 +187,39 @@ void add_placement_options(CLI::App& command, ComposeArguments& arguments) {
 
 void add_compose_command(CLI::App& program) {
   const auto arguments = std::make_shared<ComposeArguments>();
-  CLI::App* command = program.add_subcommand("compose", kHelp);
+  CLI::App* command = program.add_subcommand(
+      "compose", "Compose walking people into a recorded static sequence, with exact ground truth");
+  command->footer(kHelp);
   command
       ->add_option("FOLDER", arguments->settings.folder,
-                   "A TUM RGB-D folder without people, with groundtruth.txt")
+                   "TUM RGB-D folder without people, with groundtruth.txt")
       ->required();
   command
-      ->add_option("--camera", arguments->camera,
-                   "Its camera: tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated, or a YAML file")
+      ->add_option(
+          "--camera", arguments->camera,
+          "Its camera: a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file")
       ->required();
-  command->add_option("--people", arguments->people, "Folder of pictures of people, each with its mask")
+  command->add_option("--people", arguments->people, "Folder of images of people, each with its mask")
       ->required();
-  command->add_option("--out", arguments->settings.out, "Folder to write to; made where it is missing")
+  command
+      ->add_option("--out", arguments->settings.out,
+                   "Folder the sequence is written to; made if it does not exist")
       ->required();
-  command->add_option("--actors", arguments->options.actors, "How many people; 0 copies the sequence")
+  command->add_option("--actors", arguments->options.actors, "Number of people; 0 copies the sequence")
       ->check(CLI::Range(0, 100))
       ->capture_default_str();
-  command->add_option("--seed", arguments->options.seed, "Another number makes other people walk otherwise")
+  command->add_option("--seed", arguments->options.seed, "Seed of the choice of people and of their paths")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   add_placement_options(*command, *arguments);
-  command->add_option("--frames", arguments->settings.frames, "How many frames to write; default all")
+  command->add_option("--frames", arguments->settings.frames, "Number of frames to write; default all")
       ->check(CLI::PositiveNumber);
   command
       ->add_option("--depth-units", arguments->settings.depth_units_per_metre,
-                   "Units a metre of the depth images; 1000 for what is farther than 13 m")
+                   "Value of the written depth images at one metre; 5000 reaches 13 m, 1000 reaches 65 m")
       ->check(CLI::Range(1.0, 100000.0))
       ->capture_default_str();
-  command->add_flag("--quiet", arguments->settings.quiet, "No progress");
+  command->add_flag("--quiet", arguments->settings.quiet, "Print no progress");
   command->add_flag("--json", arguments->json, "Print the summary as one JSON object");
   command->callback([arguments] { compose(*arguments); });
 }

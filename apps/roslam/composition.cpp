@@ -6,25 +6,26 @@
 #include <set>
 #include <system_error>
 
-#include "apps/roslam/output.hpp"
-#include "apps/roslam/progress.hpp"
-#include "apps/roslam/tum_writer.hpp"
-#include "roslam/error.hpp"
-#include "roslam/sources/image_file.hpp"
-#include "roslam/sources/upright.hpp"
-#include "roslam/write_file.hpp"
+#include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/progress.hpp"
+#include "apps/roslam/support/tum_writer.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/write_file.hpp"
+#include "roslam/sensors/image_file.hpp"
+#include "simulation/composition/upright.hpp"
 
 namespace roslam::app {
+
+using namespace simulation;
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kUprightImages = 30;  // depth images that tell which way is up
-constexpr double kMaxTruthGap = 0.2;        // seconds between true poses that a frame may lie between
-constexpr double kTruthMargin =
-    0.1;  // seconds of truth that are kept before the first and after the last frame
+constexpr std::size_t kUprightImages = 30;  // depth images from which the up direction is estimated
+constexpr double kMaxTruthGap = 0.2;        // seconds; longest interval of true poses to interpolate in
+constexpr double kTruthMargin = 0.1;        // seconds of truth kept before the first and after the last frame
 
-// The lists of the output folder, a line a frame.
+// The image lists of the output folder, one line per frame.
 class Lists {
  public:
   explicit Lists(const fs::path& out)
@@ -57,10 +58,10 @@ class Lists {
 };
 
 void write_images(const fs::path& out, const std::string& name, const ComposedFrame& frame, double units) {
-  write_picture(out / "rgb" / name, frame.colour);
-  write_picture(out / "depth" / name, packed_depth(frame.depth, units));
-  write_picture(out / "labels" / name, frame.labels);
-  write_picture(out / "instances" / name, frame.instances);
+  write_image_fast(out / "rgb" / name, frame.colour);
+  write_image_fast(out / "depth" / name, packed_depth(frame.depth, units));
+  write_image_fast(out / "labels" / name, frame.labels);
+  write_image_fast(out / "instances" / name, frame.instances);
 }
 
 void write_truth(const fs::path& out, const Trajectory& truth, const Composition& made) {
@@ -80,7 +81,7 @@ Trajectory read_truth(const fs::path& folder) {
   std::error_code error;
   if (!fs::exists(file, error)) {
     throw InputError(file.string() +
-                     ": is missing; people can only be put into a sequence whose camera poses are known");
+                     ": is missing; people can only be composed into a sequence with known camera poses");
   }
   Trajectory truth = read_trajectory(file).trajectory;
   const auto images = read_tum_list(folder / "rgb.txt");
@@ -114,7 +115,7 @@ std::optional<Eigen::Vector3d> find_up(const fs::path& folder, const Camera& cam
   return estimate.up();
 }
 
-// The output has the layout of the input: in its place it would replace it.
+// The output has the layout of the input: in the same folder it would overwrite it.
 void protect_base(const CompositionSettings& settings) {
   std::set<fs::path> folders{settings.folder};
   for (const char* list : {"rgb.txt", "depth.txt"}) {

@@ -8,48 +8,49 @@
 #include <string>
 #include <string_view>
 
-#include "apps/roslam/output.hpp"
-#include "roslam/cloud/occupancy.hpp"
-#include "roslam/cloud/surface_file.hpp"
-#include "roslam/error.hpp"
+#include "apps/roslam/support/output.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/dense/surface_file.hpp"
 
 namespace roslam::app {
 
 namespace {
 namespace fs = std::filesystem;
 
-Surface read_points(const fs::path& map, const DenseExport& what) {
-  Surface surface = read_surface_ply(map);
+SurfaceMap read_points(const fs::path& map, const DenseExport& what) {
+  SurfaceMap surface = read_surface_ply(map);
   if (surface.points.empty()) {
     throw InputError(map.string() +
-                     ": the map is empty, as nothing was fused into it; fly where things are "
+                     ": the map is empty, nothing was fused into it; fly where surfaces are "
                      "nearer than dense.max_depth and check the camera's depth units");
   }
-  if (!what.no_invented) return surface;
-  surface = without_invented(surface);
+  if (!what.no_inpainted) return surface;
+  surface = without_inpainted(surface);
   if (surface.points.empty())
-    throw InputError(map.string() + ": all of the map was invented; leave out --no-invented");
+    throw InputError(map.string() + ": all points of the map are inpainted; leave out --no-inpainted");
   return surface;
 }
 
-// Occupied where points are; free as a file beside the map tells, which the run wrote from what cameras saw.
-Occupancy occupancy_of_points(const fs::path& map, const Surface& surface, const DenseExport& what) {
-  const fs::path seen_file = fs::path(map).replace_extension(".bt");
-  std::optional<Occupancy> seen;
-  if (fs::exists(seen_file)) {
-    seen = Occupancy::read(seen_file);
+// Occupied cells come from the points, free cells from the dense.bt beside the map, which the run wrote by
+// ray casting from the camera positions.
+OccupancyMap occupancy_of_points(const fs::path& map, const SurfaceMap& surface, const DenseExport& what) {
+  const fs::path of_run_file = fs::path(map).replace_extension(".bt");
+  std::optional<OccupancyMap> of_run;
+  if (fs::exists(of_run_file)) {
+    of_run = OccupancyMap::read(of_run_file);
   } else {
-    std::cerr << "note: " << seen_file.string()
-              << ": no such file, so that only occupied cells are known and none is free\n";
+    std::cerr << "note: " << of_run_file.string()
+              << ": no such file; only occupied cells are known, all others are unknown\n";
   }
-  const double usual = seen ? seen->resolution() : usual_resolution(surface.spacing);
-  Occupancy result(what.resolution.value_or(usual));
+  const double usual = of_run ? of_run->resolution() : usual_resolution(surface.spacing);
+  OccupancyMap result(what.resolution.value_or(usual));
   result.add_surface(surface);
-  if (seen) result.free_from(*seen);
+  if (of_run) result.free_from(*of_run);
   return result;
 }
 
-void say(const fs::path& file, const std::string& content) {
+void report(const fs::path& file, const std::string& content) {
   std::printf("wrote %s: %s\n", content.c_str(), file.c_str());
 }
 }  // namespace
@@ -62,7 +63,7 @@ bool is_dense_map(const fs::path& file) {
 }
 
 void export_dense(const fs::path& map, const DenseExport& what) {
-  const Surface surface = read_points(map, what);
+  const SurfaceMap surface = read_points(map, what);
   if (!what.mesh.empty() && surface.triangles.empty()) {
     throw InputError(
         map.string() +
@@ -71,23 +72,23 @@ void export_dense(const fs::path& map, const DenseExport& what) {
   const std::string points = std::to_string(surface.points.size()) + " points";
   if (!what.ply.empty()) {
     write_surface_ply(what.ply, surface, false);
-    say(what.ply, points);
+    report(what.ply, points);
   }
   if (!what.mesh.empty()) {
     write_surface_ply(what.mesh, surface, true);
-    say(what.mesh, points + " and " + std::to_string(surface.triangles.size()) + " triangles");
+    report(what.mesh, points + " and " + std::to_string(surface.triangles.size()) + " triangles");
   }
   if (!what.pcd.empty()) {
     write_surface_pcd(what.pcd, surface);
-    say(what.pcd, points);
+    report(what.pcd, points);
   }
   if (!what.octomap.empty()) {
-    const Occupancy occupancy = occupancy_of_points(map, surface, what);
+    const OccupancyMap occupancy = occupancy_of_points(map, surface, what);
     occupancy.write(what.octomap);
     std::array<char, 96> content{};
     std::snprintf(content.data(), content.size(), "cells of %g m, %.4g m3 occupied and %.4g m3 free",
                   occupancy.resolution(), occupancy.occupied_volume(), occupancy.free_volume());
-    say(what.octomap, content.data());
+    report(what.octomap, content.data());
   }
   require_written_output();
 }

@@ -5,10 +5,10 @@
 #include <stop_token>
 #include <string>
 
-#include "apps/roslam/sources.hpp"
-#include "roslam/pipeline/run.hpp"
-#include "roslam/pipeline/run_folder.hpp"
-#include "roslam/pipeline/slam.hpp"
+#include "apps/roslam/support/sources.hpp"
+#include "recording/run_folder.hpp"
+#include "roslam/slam/run.hpp"
+#include "roslam/slam/slam.hpp"
 
 namespace roslam::app {
 
@@ -36,8 +36,8 @@ struct FlightArguments {
 struct Flight {
   std::unique_ptr<FrameSource> source;
   std::unique_ptr<Slam> slam;
-  RunSummary summary;
-  RunDescription description;
+  recording::RunResults summary;
+  recording::RunDescription description;
   std::size_t restored = 0;  ///< keyframes
 };
 
@@ -47,7 +47,7 @@ Options options_of(const FlightArguments& arguments);
 /// Flies through a source and writes what it finds to the folder `out`, also if the flight is interrupted or
 /// fails. Without the weights of a network, or without a vocabulary, it flies without and says so. Throws
 /// what the flight failed with, OutputError, or InputError if there is not a single pose.
-Flight fly(const FlightArguments& arguments, Options options, const std::string& version,
-           const std::stop_token& stop);
+Flight fly(const FlightArguments& arguments, const Options& options, const std::string& version,
+           const std::stop_token& stop, const std::stop_token& urgent_stop = {});
 
 }  // namespace roslam::app

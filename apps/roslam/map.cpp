@@ -9,41 +9,44 @@
 #include <string>
 #include <vector>
 
-#include "apps/roslam/commands.hpp"
 #include "apps/roslam/export_dense.hpp"
-#include "apps/roslam/output.hpp"
-#include "apps/roslam/progress.hpp"
-#include "apps/roslam/sources.hpp"
-#include "roslam/atlas/map_file.hpp"
-#include "roslam/atlas/merge_maps.hpp"
-#include "roslam/error.hpp"
+#include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/progress.hpp"
+#include "apps/roslam/support/sources.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/write_file.hpp"
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/map/map_ply.hpp"
-#include "roslam/pipeline/options.hpp"
-#include "roslam/write_file.hpp"
+#include "roslam/map_io/map_file.hpp"
+#include "roslam/map_io/merge_maps.hpp"
+#include "roslam/slam/options.hpp"
+#include "roslam/slam/settings.hpp"
 
 namespace roslam::app {
+
+using namespace simulation;
 
 namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// The world with most keyframes.
-WorldId main_world(const Map& map) {
-  std::map<WorldId, std::size_t> sizes;
-  for (const KeyframeId id : map.keyframe_ids()) ++sizes[map.find(id)->world];
+// The submap with most keyframes.
+SubmapId main_submap(const Map& map) {
+  std::map<SubmapId, std::size_t> sizes;
+  for (const KeyframeId id : map.keyframe_ids()) ++sizes[map.find(id)->submap];
   const auto largest = std::max_element(sizes.begin(), sizes.end(),
                                         [](const auto& a, const auto& b) { return a.second < b.second; });
-  return largest != sizes.end() ? largest->first : WorldId{0};
+  return largest != sizes.end() ? largest->first : SubmapId{0};
 }
 
-// Metres along x, y and z within which the landmarks of the main world lie, but for the farthest hundredths.
+// Extent of the landmarks of the main submap along x, y and z in metres, from the 1st to the 99th percentile.
 Eigen::Vector3d extent(const Map& map) {
-  const WorldId world = main_world(map);
+  const SubmapId submap = main_submap(map);
   std::array<std::vector<double>, 3> coordinates;
   for (const LandmarkId id : map.landmark_ids()) {
     const Landmark& landmark = *map.find(id);
-    if (map.world_of(landmark) != world) continue;
+    if (map.submap_of(landmark) != submap) continue;
     for (int axis = 0; axis < 3; ++axis)
       coordinates[static_cast<std::size_t>(axis)].push_back(landmark.position[axis]);
   }
@@ -58,12 +61,11 @@ Eigen::Vector3d extent(const Map& map) {
   return result;
 }
 
-std::string words_of(const SavedMap& saved) {
-  if (saved.vocabulary == 0) return "none; made when the map is used";
-  const fs::path shipped = shipped_vocabulary();
+std::string vocabulary_of(const SavedMap& saved) {
+  if (saved.vocabulary == 0) return "none; computed when the map is used";
+  const fs::path shipped = find_vocabulary();
   const bool is_shipped = !shipped.empty() && Vocabulary::load(shipped).fingerprint() == saved.vocabulary;
-  return is_shipped ? "of the vocabulary that comes with the program"
-                    : "of another vocabulary; made anew when the map is used";
+  return is_shipped ? "of the shipped vocabulary" : "of another vocabulary; recomputed when the map is used";
 }
 
 Json describe(const fs::path& file, const SavedMap& saved) {
@@ -83,10 +85,10 @@ Json describe(const fs::path& file, const SavedMap& saved) {
           {"keyframes", map.keyframe_count()},
           {"landmarks", map.landmark_count()},
           {"loops", map.loops().size()},
-          {"flights", map.keyframe_count() > 0 ? map.flight() + 1 : 0},
-          {"worlds", map.worlds().size()},
+          {"sessions", map.keyframe_count() > 0 ? map.session() + 1 : 0},
+          {"submaps", map.submaps().size()},
           {"extent_metres", {size.x(), size.y(), size.z()}},
-          {"words", words_of(saved)}};
+          {"words", vocabulary_of(saved)}};
 }
 
 struct InfoArguments {
@@ -104,13 +106,13 @@ void show_info(const InfoArguments& arguments) {
     std::printf("camera: %d x %d, fx %g, fy %g, cx %g, cy %g\n", camera["width"].get<int>(),
                 camera["height"].get<int>(), camera["fx"].get<double>(), camera["fy"].get<double>(),
                 camera["cx"].get<double>(), camera["cy"].get<double>());
-    std::printf("keyframes: %zu, flights: %zu\nlandmarks: %zu, within %.1f x %.1f x %.1f m\n",
-                info["keyframes"].get<std::size_t>(), info["flights"].get<std::size_t>(),
+    std::printf("keyframes: %zu, sessions: %zu\nlandmarks: %zu, within %.1f x %.1f x %.1f m\n",
+                info["keyframes"].get<std::size_t>(), info["sessions"].get<std::size_t>(),
                 info["landmarks"].get<std::size_t>(), size[0].get<double>(), size[1].get<double>(),
                 size[2].get<double>());
     std::printf("loops: %zu\n", info["loops"].get<std::size_t>());
-    if (const auto worlds = info["worlds"].get<std::size_t>(); worlds > 1)
-      std::printf("parts that never met: %zu\n", worlds);
+    if (const auto submaps = info["submaps"].get<std::size_t>(); submaps > 1)
+      std::printf("submaps that were never merged: %zu\n", submaps);
     std::printf("words: %s\nsize: %.1f MB\n", info["words"].get<std::string>().c_str(),
                 info["bytes"].get<double>() / 1048576.0);
   }
@@ -119,10 +121,15 @@ void show_info(const InfoArguments& arguments) {
 
 void add_info_command(CLI::App& map) {
   const auto arguments = std::make_shared<InfoArguments>();
-  CLI::App* command = map.add_subcommand("info", "Say what a map holds");
-  command->footer("Example:\n  roslam map info live/map.roslam");
-  command->add_option("MAP", arguments->file, "Map that roslam run wrote")->required();
-  command->add_flag("--json", arguments->json, "Print one JSON object");
+  CLI::App* command = map.add_subcommand("info", "Print the contents of a map");
+  command->footer(
+      "Example:\n"
+      "  roslam map info live/map.roslam\n"
+      "Prints the camera, the numbers of keyframes, landmarks, loops, sessions (runs that made the map) and\n"
+      "submaps (parts not connected with each other), the extent in metres and the size of the file.\n"
+      "Exit code: 0 success, 1 an error in the input, 2 wrong usage.");
+  command->add_option("MAP", arguments->file, "Map file that roslam run wrote (map.roslam)")->required();
+  command->add_flag("--json", arguments->json, "Print one JSON object on stdout");
   command->callback([arguments] { show_info(*arguments); });
 }
 
@@ -143,14 +150,14 @@ void merge(const MergeArguments& arguments) {
         "models/roslam-orb.vocabulary: not found beside the program; install it or name it with "
         "--vocabulary");
   }
-  std::vector<SavedMap> maps;  // all of them first: an error at the end would cost the work until then
+  std::vector<SavedMap> maps;  // all of them first: an error at the end would waste the merges before it
   for (const auto& file : arguments.maps) maps.push_back(load_map(file));
   SavedMap merged = std::move(maps.front());
   for (std::size_t i = 1; i < maps.size(); ++i) {
     const SavedMap& next = maps[i];
     Progress progress(next.map.keyframe_count(), arguments.quiet || arguments.json);
-    merged = merge_maps(merged, next, vocabulary, options.loop_settings(),
-                        [&](std::size_t done) { progress.show(done, "keyframes searched for"); });
+    merged = merge_maps(merged, next, vocabulary, loop_settings(options),
+                        [&](std::size_t done) { progress.show(done, "keyframes queried"); });
   }
   save_map(arguments.out, merged);
   const Map& map = merged.map;
@@ -165,20 +172,23 @@ void merge(const MergeArguments& arguments) {
 
 void add_merge_command(CLI::App& map) {
   const auto arguments = std::make_shared<MergeArguments>();
-  CLI::App* command = map.add_subcommand("merge", "Make one map of several that overlap");
+  CLI::App* command = map.add_subcommand("merge", "Merge maps that overlap into one");
   command->footer(
       "Example:\n"
       "  roslam map merge monday/map.roslam tuesday/map.roslam --out street.roslam\n"
-      "Coordinates are those of the first. Maps that show no place in common are refused.");
-  command->add_option("MAPS", arguments->maps, "Two maps or more, of one camera")
+      "Place recognition aligns each map with the merged ones; coordinates are those of the first. A map\n"
+      "in which no keyframe of the others is recognised is refused.\n"
+      "Exit code: 0 success, 1 an error in the input, 2 wrong usage.");
+  command->add_option("MAPS", arguments->maps, "Two or more map files (map.roslam) of the same camera")
       ->required()
       ->expected(2, 1000);
   command->add_option("--out", arguments->out, "File the merged map is written to")->required();
   command->add_option("--vocabulary", arguments->vocabulary,
-                      "Words that places are recognised by, in place of those that come with the program");
-  command->add_option("--config", arguments->config, "YAML file with options, as of roslam run");
-  command->add_flag("--quiet", arguments->quiet, "No progress");
-  command->add_flag("--json", arguments->json, "Print what the map holds as one JSON object");
+                      "Vocabulary for place recognition (roslam vocabulary train); default the shipped one");
+  command->add_option("--config", arguments->config, "YAML file with options, as for roslam run");
+  command->add_flag("--quiet", arguments->quiet, "Print no progress");
+  command->add_flag("--json", arguments->json,
+                    "Print the contents of the merged map as one JSON object on stdout");
   command->callback([arguments] { merge(*arguments); });
 }
 
@@ -186,34 +196,35 @@ struct ExportArguments {
   fs::path map;
   fs::path keyframes;
   fs::path camera;
-  std::optional<std::uint32_t> flight;
+  std::optional<std::uint32_t> session;
   DenseExport dense;  // its ply serves both kinds of maps
 
-  bool is_of_flight() const { return !keyframes.empty() || !camera.empty() || flight; }
+  // Whether it asks for something that only a map.roslam has.
+  bool needs_sparse_map() const { return !keyframes.empty() || !camera.empty() || session; }
 };
 
 void export_sparse(const fs::path& file, const ExportArguments& arguments) {
   const SavedMap saved = load_map(file);
   const Map& map = saved.map;
-  const WorldId world = main_world(map);
-  if (!arguments.dense.ply.empty()) write_map_ply(arguments.dense.ply, map, world);
+  const SubmapId submap = main_submap(map);
+  if (!arguments.dense.ply.empty()) write_map_ply(arguments.dense.ply, map, submap);
   if (!arguments.camera.empty()) write_file(arguments.camera, camera_to_yaml(saved.camera));
   if (!arguments.keyframes.empty()) {
-    const std::uint32_t flight = arguments.flight.value_or(map.flight());
-    const Trajectory trajectory = map.trajectory(flight, world);
+    const std::uint32_t session = arguments.session.value_or(map.session());
+    const Trajectory trajectory = map.trajectory(session, submap);
     if (trajectory.empty()) {
-      throw InputError(file.string() + ": no keyframe of flight " + std::to_string(flight) +
-                       " in its largest part; choose another --flight, counted from 0 (roslam map info)");
+      throw InputError(file.string() + ": no keyframe of session " + std::to_string(session) +
+                       " in its largest submap; choose another --session, counted from 0 (roslam map info)");
     }
     write_trajectory(arguments.keyframes, trajectory);
   }
   require_written_output();
 }
 
-// Of a run folder, the map that has what is asked for.
+// The map file to read; of a run folder the one that has what is asked for.
 fs::path map_file(const ExportArguments& arguments) {
   if (!fs::is_directory(arguments.map)) return arguments.map;
-  if (arguments.is_of_flight()) return arguments.map / "map.roslam";
+  if (arguments.needs_sparse_map()) return arguments.map / "map.roslam";
   const fs::path dense = arguments.map / "dense.ply";
   if (!fs::exists(dense)) {
     throw InputError(dense.string() +
@@ -231,14 +242,14 @@ void export_map(const ExportArguments& arguments) {
   if (dense.resolution && dense.octomap.empty()) refuse("--resolution needs --octomap");
   const fs::path file = map_file(arguments);
   if (is_dense_map(file)) {
-    if (arguments.is_of_flight())
-      refuse("--keyframes, --flight and --camera need a map.roslam, not a PLY file");
+    if (arguments.needs_sparse_map())
+      refuse("--keyframes, --session and --camera need a map.roslam, not a PLY file");
     export_dense(file, dense);
   } else {
     if (dense.is_of_dense_only()) {
       refuse(
-          "--mesh, --pcd, --octomap, --resolution and --no-invented need a dense map, and none of "
-          "--keyframes, --flight and --camera");
+          "--mesh, --pcd, --octomap, --resolution and --no-inpainted need a dense map, and none of "
+          "--keyframes, --session and --camera");
     }
     export_sparse(file, arguments);
   }
@@ -252,43 +263,48 @@ std::string octomap_ending(const std::string& file) {
 constexpr auto kExportExamples = R"(Examples:
   roslam map export live/map.roslam --ply landmarks.ply --keyframes keyframes.txt --camera camera.yaml
   roslam map export live --mesh street.ply --pcd street.pcd
-  roslam map export live/dense.ply --octomap street.bt --resolution 0.1 --no-invented
+  roslam map export live/dense.ply --octomap street.bt --resolution 0.1 --no-inpainted
 
-MAP is a map.roslam, a dense map (PLY), or the folder of a run, whose dense.ply is taken, or its map.roslam where
---keyframes or --camera is asked for. Of parts of a map.roslam that never met, the largest is written.
-OctoMap files hold cells that are occupied, by the points of the map, and free, as dense.bt beside dense.ply (the PLY's name
-with .bt) tells; without that file only occupied cells are known.
+MAP is a map.roslam, a dense map (PLY), or the folder of a run: then its map.roslam is read if --keyframes,
+--session or --camera is given, else its dense.ply. Of a map.roslam with several submaps the largest is
+written.
+Occupied cells of an OctoMap come from the points of the dense map, free cells from dense.bt beside dense.ply
+(the name of the PLY with .bt); without that file only occupied cells are known.
+Coordinates are those of the map, in metres.
 Exit code: 0 success, 1 an error in the input, 2 wrong usage.)";
 
 void add_export_command(CLI::App& map) {
   const auto arguments = std::make_shared<ExportArguments>();
   DenseExport& dense = arguments->dense;
-  CLI::App* command = map.add_subcommand("export", "Write what a map holds in formats of other programs");
+  CLI::App* command = map.add_subcommand("export", "Export a map to PLY, PCD, OctoMap and TUM files");
   command->footer(kExportExamples);
-  command->add_option("MAP", arguments->map, "Map that roslam run wrote, or the folder of a run")->required();
+  command->add_option("MAP", arguments->map, "map.roslam, dense map (PLY) or folder of a run")->required();
   command->add_option("--ply", dense.ply,
-                      "Points with colour (binary PLY): of a dense map with normals, labels and provenance, "
-                      "else landmarks");
-  command->add_option("--mesh", dense.mesh, "The same of a dense map, with triangles (binary PLY)");
-  command->add_option("--pcd", dense.pcd, "Points of a dense map (binary PCD)");
-  command->add_option("--octomap", dense.octomap, "Occupancy by a dense map: .bt, or .ot with probabilities")
+                      "Write coloured points (binary PLY): of a dense map, with normals, labels and "
+                      "provenance, else landmarks");
+  command->add_option("--mesh", dense.mesh, "Write points and triangles of a dense map (binary PLY)");
+  command->add_option("--pcd", dense.pcd, "Write points of a dense map (binary PCD)");
+  command
+      ->add_option("--octomap", dense.octomap,
+                   "Write occupancy of a dense map: .bt (binary OctoMap) or .ot (with probabilities)")
       ->check(octomap_ending);
   command
       ->add_option("--resolution", dense.resolution,
-                   "Side of a cell of --octomap, metres; default that of dense.bt, else twice the spacing "
-                   "of points, at least 0.05")
+                   "Cell size of --octomap, metres; default that of dense.bt, else twice the point spacing, "
+                   "at least 0.05")
       ->check(CLI::Range(0.001, 10.0));
-  command->add_flag("--no-invented", dense.no_invented, "Leave out points that nobody saw");
-  command->add_option("--keyframes", arguments->keyframes, "Poses of a flight's keyframes (TUM format)");
-  command->add_option("--flight", arguments->flight,
-                      "Flight whose keyframes are written, from 0; default the newest");
-  command->add_option("--camera", arguments->camera, "Calibration, a file for --camera of roslam run");
+  command->add_flag("--no-inpainted,--no-invented", dense.no_inpainted, "Leave out inpainted points");
+  command->add_option("--keyframes", arguments->keyframes,
+                      "Write the keyframe poses of a session (TUM format)");
+  command->add_option("--session,--flight", arguments->session,
+                      "Session whose keyframes are written, counted from 0; default the newest");
+  command->add_option("--camera", arguments->camera, "Write the camera parameters (YAML)");
   command->callback([arguments] { export_map(*arguments); });
 }
 }  // namespace
 
 void add_map_command(CLI::App& program) {
-  CLI::App* map = program.add_subcommand("map", "Look into, merge or export maps that runs wrote");
+  CLI::App* map = program.add_subcommand("map", "Inspect, merge or export maps that roslam run wrote");
   map->require_subcommand(1);
   add_info_command(*map);
   add_merge_command(*map);

@@ -7,47 +7,52 @@
 #include <string>
 #include <vector>
 
-#include "apps/roslam/commands.hpp"
 #include "apps/roslam/flight.hpp"
-#include "apps/roslam/inpainter.hpp"
-#include "apps/roslam/interrupt.hpp"
-#include "apps/roslam/output.hpp"
-#include "apps/roslam/progress.hpp"
-#include "apps/roslam/restored_folder.hpp"
-#include "apps/roslam/sources.hpp"
-#include "roslam/error.hpp"
-#include "roslam/evaluation/markdown_table.hpp"
-#include "roslam/evaluation/statistics.hpp"
-#include "roslam/geometry/stopwatch.hpp"
-#include "roslam/pipeline/recorded_run.hpp"
-#include "roslam/pipeline/sequence_restorer.hpp"
-#include "roslam/sources/simulated_source.hpp"
-#include "roslam/sources/tum_source.hpp"
-#include "roslam/write_file.hpp"
+#include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/inpainter.hpp"
+#include "apps/roslam/support/interrupt.hpp"
+#include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/progress.hpp"
+#include "apps/roslam/support/restored_folder.hpp"
+#include "apps/roslam/support/sources.hpp"
+#include "evaluation/plots/markdown_table.hpp"
+#include "evaluation/statistics.hpp"
+#include "recording/recorded_run.hpp"
+#include "recording/sequence_restorer.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/stopwatch.hpp"
+#include "roslam/common/write_file.hpp"
+#include "roslam/sensors/tum_source.hpp"
+#include "roslam/slam/settings.hpp"
+#include "simulation/simulated_source.hpp"
 
 namespace roslam::app {
+
+using namespace evaluation;
+using namespace recording;
+using namespace simulation;
 
 namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 struct RestoreArguments {
-  FlightArguments flight;  // for what is not flown yet
+  FlightArguments flight;  // for a source that has no run yet
   fs::path out;
   fs::path models;
   std::string method;     // empty: as the options say
-  std::size_t every = 1;  // frame is restored
+  std::size_t every = 1;  // every so many-th frame is restored
   bool json = false;
 };
 
-// The flight that a run recorded, from its beginning.
+// The source that a run was made from, from its first frame.
 std::unique_ptr<FrameSource> open_source_of(const RecordedRun& run) {
   const bool is_simulated = run.source().starts_with("simulated:");
   std::error_code error;
   if (is_simulated ? run.flight().empty() : !fs::exists(run.source(), error)) {
     throw InputError(
         "the run is of " + run.source() +
-        (is_simulated ? ", but an earlier version did not note which flight it was; repeat the run"
+        (is_simulated ? ", but an earlier version did not record the options of the flight; repeat the run"
                       : ", which is not there; run roslam restore in the folder that roslam run was run in"));
   }
   if (is_simulated)
@@ -64,22 +69,22 @@ std::string name_of_files(const FrameSource& source, const Frame& frame) {
 std::shared_ptr<Inpainter> inpainter_for(const RestoreArguments& arguments,
                                          const RestorationOptions& options) {
   if (arguments.method == "gan") return require_inpainter(arguments.models);
-  const bool is_wanted = options.invent && (arguments.method.empty() || arguments.method == "both");
+  const bool is_wanted = options.inpaint && (arguments.method.empty() || arguments.method == "both");
   return is_wanted ? open_inpainter(arguments.models) : nullptr;
 }
 
 StaticSceneRestorer::Settings settings_for(const RestoreArguments& arguments, const RecordedRun& run) {
   const bool has_config = !arguments.flight.config.empty();
   const Options options = has_config ? read_options(arguments.flight.config) : run.removal().options();
-  StaticSceneRestorer::Settings settings = options.restorer_settings();
+  StaticSceneRestorer::Settings settings = restorer_settings(options);
   if (arguments.method.empty()) return settings;
   settings.restoration.reproject = arguments.method == "both" || arguments.method == "reprojection";
-  settings.restoration.invent = arguments.method != "reprojection";
-  if (arguments.method == "navier-stokes") settings.invention.classic = ClassicMethod::kNavierStokes;
+  settings.restoration.inpaint = arguments.method != "reprojection";
+  if (arguments.method == "navier-stokes") settings.inpainting.classic = ClassicMethod::kNavierStokes;
   return settings;
 }
 
-// The folder of the run, which is made first if the user named something to fly through.
+// The folder of the run; for a source without a run, roslam run is executed first.
 fs::path run_folder_of(const RestoreArguments& arguments, const std::string& version,
                        const std::stop_token& stop) {
   const std::string& name = arguments.flight.source.name;
@@ -92,7 +97,7 @@ fs::path run_folder_of(const RestoreArguments& arguments, const std::string& ver
 }
 
 struct Restored {
-  std::vector<double> milliseconds;  // processor time, of frames with holes
+  std::vector<double> milliseconds;  // processor time of each frame with holes
   std::map<std::string, std::size_t> left_out;
 };
 
@@ -102,7 +107,7 @@ void keep_sources(SequenceRestorer& sequence, FrameSource& source, bool quiet, c
     const auto frame = source.next();
     if (!frame) return;
     if (sequence.is_source(frame->timestamp)) sequence.keep(*frame);
-    progress.show(frame->index + 1, "looked through");
+    progress.show(frame->index + 1, "read");
   }
 }
 
@@ -130,7 +135,7 @@ Restored restore_all(SequenceRestorer& sequence, FrameSource& source, RestoredFo
 
 Json report_of(const RestoreArguments& arguments, const RecordedRun& run, const RestoredFolder& folder,
                const Restored& restored, std::size_t sources, bool has_network, bool interrupted) {
-  const auto hole = static_cast<double>(folder.reprojected() + folder.invented());
+  const auto hole = static_cast<double>(folder.reprojected() + folder.inpainted());
   const auto share = [&](std::size_t pixels) {
     return hole > 0.0 ? Json(static_cast<double>(pixels) / hole) : Json(nullptr);
   };
@@ -144,7 +149,7 @@ Json report_of(const RestoreArguments& arguments, const RecordedRun& run, const 
           {"frames_filled_from", sources},
           {"hole_share", hole / std::max(1.0, hole + static_cast<double>(folder.measured()))},
           {"reprojected_share_of_hole", share(folder.reprojected())},
-          {"invented_share_of_hole", share(folder.invented())},
+          {"inpainted_share_of_hole", share(folder.inpainted())},
           {"processor_milliseconds_a_frame",
            restored.milliseconds.empty() ? Json(nullptr) : Json(median(restored.milliseconds))}};
 }
@@ -155,14 +160,14 @@ void print(const Json& report) {
   };
   std::cout << "restored " << report["frames"] << " frames from " << report["frames_filled_from"]
             << " of them\n"
-            << "removed: " << percent("hole_share") << " of the pictures; of that seen at other times "
-            << percent("reprojected_share_of_hole") << ", invented " << percent("invented_share_of_hole")
+            << "removed: " << percent("hole_share") << " of the image area; of that reprojected "
+            << percent("reprojected_share_of_hole") << ", inpainted " << percent("inpainted_share_of_hole")
             << "\n";
   for (const auto& [reason, count] : report["left_out"].items())
-    std::cout << "left out " << count << ": " << reason << "\n";
+    std::cout << "not restored: " << count << " x " << reason << "\n";
   if (!report["processor_milliseconds_a_frame"].is_null())
     std::cout << "median " << fixed(report["processor_milliseconds_a_frame"].get<double>(), 0)
-              << " ms of processor time a frame with holes\n";
+              << " ms of processor time per frame with holes\n";
   std::cout << "results: " << report["out"].get<std::string>() << "\n";
 }
 
@@ -175,12 +180,12 @@ void restore(RestoreArguments arguments, const std::string& version) {
   const RecordedRun run(run_folder_of(arguments, version, stop));
   RestoredFolder::require_apart(arguments.out, run.source());
   const auto settings = settings_for(arguments, run);
-  const auto first_pass = open_source_of(run);  // what is wrong with it is to be said alone
+  const auto first_pass = open_source_of(run);  // reports its errors before anything else is done
   const auto inpainter = inpainter_for(arguments, settings.restoration);
   StaticSceneRestorer restorer(run.camera(), settings, inpainter);
   SequenceRestorer sequence(run, restorer);
   keep_sources(sequence, *first_pass, arguments.flight.quiet, stop);
-  if (stop.stop_requested()) {  // what an earlier run restored stays
+  if (stop.stop_requested()) {  // before the results of an earlier call are replaced
     std::cerr << "interrupted before anything was restored\n";
     return;
   }
@@ -191,7 +196,7 @@ void restore(RestoreArguments arguments, const std::string& version) {
   folder.close(report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   if (folder.frames() == 0 && !stop.stop_requested())
     throw InputError(run.source() + ": no frame could be restored" + in_words(restored.left_out) +
-                     "; is it what the run flew?");
+                     "; is it the source of the run?");
   if (arguments.json) {
     std::cout << report.dump(-1, ' ', false, Json::error_handler_t::replace) << "\n";
   } else {
@@ -200,7 +205,7 @@ void restore(RestoreArguments arguments, const std::string& version) {
   require_written_output();
 }
 
-// What the run knows cannot be told it once more.
+// Options of the source are recorded in the run and must not contradict it.
 void require_no_flight_options(const CLI::App& command) {
   for (const char* name :
        {"--camera", "--traffic", "--frames", "--seed", "--speed", "--altitude", "--aside", "--gain"})
@@ -211,40 +216,44 @@ void require_no_flight_options(const CLI::App& command) {
 void add_restore_command(CLI::App& program, const std::string& version) {
   const auto arguments = std::make_shared<RestoreArguments>();
   CLI::App* command = program.add_subcommand(
-      "restore", "Write a sequence without the things that move in it: the static scene behind them");
+      "restore", "Write a sequence with its dynamic objects replaced by the static background");
   command->footer(
       "Examples:\n"
       "  roslam restore rgbd_dataset_freiburg3_walking_xyz --camera tum-fr3 --out walking_static\n"
       "  roslam run my_flight --camera my_camera.yaml --out run\n"
       "  roslam restore run --out my_flight_static\n"
-      "SOURCE is what roslam run wrote, or something to fly through first, which leaves its run in DIR/run.\n"
-      "DIR then holds the sequence in the TUM format, for any other system:\n"
-      "  rgb/ rgb.txt depth/ depth.txt camera.yaml   named and timed as in the source\n"
-      "  provenance/        where each pixel comes from: 0 measured, 128 seen at another time, 255 invented\n"
-      "  before_after.jpg   as taken, restored, and restored with what was seen green and invented magenta\n"
-      "  restoration.json   what was done");
+      "SOURCE is the folder of a run, or a source for roslam run, which is then run first, to DIR/run.\n"
+      "Pixels of dynamic objects are reprojected from other images where these show the background, and\n"
+      "inpainted elsewhere. Writes to the folder DIR of --out a sequence in TUM RGB-D format:\n"
+      "  rgb/ rgb.txt depth/ depth.txt camera.yaml   names and timestamps as in the source\n"
+      "  provenance/        origin of each pixel, 8 bit: 0 measured, 128 reprojected, 255 inpainted\n"
+      "  before_after.jpg   frames as taken, restored, and marked: reprojected green, inpainted magenta\n"
+      "  restoration.json   settings and counts\n"
+      "Ctrl-C ends it early and keeps the frames restored so far.\n"
+      "Exit code: 0 success, 1 an error in the input, 2 wrong usage.");
   add_source_options(*command, arguments->flight.source)->required();
   command->add_option("--out", arguments->out, "Folder the sequence is written to; made if it does not exist")
       ->required();
   command
-      ->add_option("--method", arguments->method,
-                   "both (default, or as the options say), or one alone to compare: reprojection (leaves "
-                   "black what nobody saw), gan, telea "
-                   "or navier-stokes (OpenCV's)")
+      ->add_option(
+          "--method", arguments->method,
+          "both: reprojection, then inpainting by the network (default, unless the options differ). For "
+          "comparison: reprojection alone (the rest stays black), or inpainting alone by gan (the "
+          "network), telea or navier-stokes (OpenCV)")
       ->check(CLI::IsMember({"both", "reprojection", "gan", "telea", "navier-stokes"}));
   command->add_option(
       "--models", arguments->models,
-      "Folder with roslam-restorer-person.onnx and so on, in place of those that come with the program");
+      "Folder with the inpainting networks (roslam-restorer-*.onnx); default the shipped ones");
   command
       ->add_option("--every", arguments->every,
-                   "Restore one frame in so many; others are filled from all the same")
+                   "Restore every N-th frame; the others still serve as source images")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_option("--config", arguments->flight.config,
-                      "YAML file with options; default those of the run");
+                      "YAML file with options; default the options of the run");
   add_flight_options(*command, arguments->flight.source);
-  command->add_flag("--quiet", arguments->flight.quiet, "No progress");
-  command->add_flag("--json", arguments->json, "Print the summary as one JSON object");
+  command->add_flag("--quiet", arguments->flight.quiet, "Print no progress");
+  command->add_flag("--json", arguments->json, "Print the summary as one JSON object on stdout");
   command->callback([arguments, command, version] {
     if (RecordedRun::recognises(arguments->flight.source.name)) require_no_flight_options(*command);
     restore(*arguments, version);

@@ -5,12 +5,14 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "apps/roslam/commands.hpp"
 #include "apps/roslam/flight.hpp"
-#include "apps/roslam/interrupt.hpp"
-#include "apps/roslam/output.hpp"
+#include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/interrupt.hpp"
+#include "apps/roslam/support/output.hpp"
 
 namespace roslam::app {
+
+using namespace recording;
 
 namespace {
 struct RunArguments {
@@ -20,19 +22,17 @@ struct RunArguments {
 };
 
 void print_map(const Slam& slam, bool has_map) {
-  if (has_map && !slam.has_met_map()) {
-    std::printf("note: no place of the map was seen again; poses are in coordinates of their own\n");
+  if (has_map && !slam.found_in_loaded_map()) {
+    std::printf("note: the camera was not localised in the loaded map; poses are in a frame of their own\n");
   }
   for (const auto& loop : slam.loops()) {
-    std::printf(
-        "loop: keyframe %u showed the place of keyframe %u again; it moved by %.3f m, %.2f degrees%s\n",
-        loop.keyframe.value, loop.place.value, loop.moved, loop.turned * 180.0 / M_PI,
-        loop.joins ? ", and two parts of the map became one" : "");
+    std::printf("loop: keyframe %u matched keyframe %u and was corrected by %.3f m, %.2f degrees%s\n",
+                loop.keyframe.value, loop.matched_keyframe.value, loop.moved, loop.turned * 180.0 / M_PI,
+                loop.merges_submaps ? "; two submaps were merged" : "");
   }
-  for (const auto& [world, frames] : slam.frames_apart()) {
+  for (const auto& [submap, frames] : slam.frames_in_other_submaps()) {
     std::printf(
-        "note: %zu frames lie in a part of the map that never met the rest; trajectory.txt leaves them "
-        "out\n",
+        "note: %zu frames are in a submap that was not merged with the main one; trajectory.txt lacks them\n",
         frames);
   }
   std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
@@ -47,19 +47,19 @@ void print_dense(const DenseMap& dense) {
   if (dense.surface.points.empty())
     std::printf("note: the dense map is empty: %s\n", std::string(why_empty(dense)).c_str());
   if (dense.times_coarsened > 0)
-    std::printf("note: voxels were made %d times as large, for the map to keep within dense.max_memory\n",
+    std::printf("note: voxels are %d times as large as configured, to stay within dense.max_memory\n",
                 1 << dense.times_coarsened);
   for (const auto& [fault, count] : dense.faults)
-    std::printf("note: not in the dense map: %s (%zu times)\n", fault.c_str(), count);
+    std::printf("note: keyframe not fused into the dense map: %s (%zu times)\n", fault.c_str(), count);
 }
 
 void print_restoration(const Flight& flight) {
   std::printf("restored: %zu keyframes, %zu dropped\n", flight.restored, flight.slam->unrestored());
   for (const auto& [fault, count] : flight.slam->restoration_faults())
-    std::printf("note: not restored: %s (%zu times)\n", fault.c_str(), count);
+    std::printf("note: keyframe not restored: %s (%zu times)\n", fault.c_str(), count);
 }
 
-void print_summary(const Slam& slam, const RunSummary& summary, const std::string& folder, bool has_map) {
+void print_summary(const Slam& slam, const RunResults& summary, const std::string& folder, bool has_map) {
   const auto times = slam.times().summary();
   const std::size_t tracked = slam.trajectory().size();
   std::printf(
@@ -68,19 +68,24 @@ void print_summary(const Slam& slam, const RunSummary& summary, const std::strin
       summary.dropped, summary.interrupted ? ", interrupted" : "");
   if (summary.removal && summary.removal->frames > 0) {
     const RemovalTally& tally = *summary.removal;
-    std::printf("removed: %.1f %% of the picture on average",
+    std::printf("removed: %.1f %% of the image area on average",
                 100.0 * tally.removed_area / static_cast<double>(tally.frames));
-    if (tally.predicted > 0) std::printf("; %zu frames predicted while it was hidden", tally.predicted);
+    if (tally.predicted > 0)
+      std::printf("; %zu frames predicted while the static scene was hidden", tally.predicted);
     std::printf("\n");
   }
   for (const auto& [fault, count] : slam.labelling_faults()) {
     std::printf("note: %s (%zu times)\n", fault.c_str(), count);
   }
+  if (slam.clock_resets() > 0)
+    std::printf("note: the clock of the source restarted (%zu times)\n", slam.clock_resets());
+  for (const auto& [fault, count] : slam.loop_faults())
+    std::printf("note: loop closing was switched off after it failed: %s\n", fault.c_str());
   print_map(slam, has_map);
   if (summary.dense) print_dense(*summary.dense);
   if (const auto found = times.find("tracking"); found != times.end()) {
-    std::printf("tracking: median %.1f ms, p95 %.1f ms of processor time a frame\n", found->second.median_ms,
-                found->second.p95_ms);
+    std::printf("tracking: median %.1f ms, p95 %.1f ms of processor time per frame\n",
+                found->second.median_ms, found->second.p95_ms);
   }
   std::printf("results: %s\n", folder.c_str());
 }
@@ -88,23 +93,23 @@ void print_summary(const Slam& slam, const RunSummary& summary, const std::strin
 void check(const FlightArguments& arguments, const Options& options) {
   if (arguments.source.name.empty()) throw CLI::RequiredError("SOURCE");
   if (arguments.out.empty()) throw CLI::RequiredError("--out");
-  if (!arguments.model.empty() && !options.removal.labels) {
+  if (!arguments.model.empty() && !options.dynamic_objects.labels) {
     throw CLI::ValidationError("--model", "needs --dynamic labels or both");
   }
   if (!arguments.vocabulary.empty() && !options.loop.enabled) {
     throw CLI::ValidationError("--vocabulary", "needs loop.enabled");
   }
   const bool restores = (arguments.restore || (options.dense.enabled && options.dense.restore)) &&
-                        options.removal.is_on() && options.keyframes.enabled;
+                        options.dynamic_objects.is_on() && options.keyframes.enabled;
   if (!arguments.models.empty() && !restores)
     throw CLI::ValidationError(
-        "--models", "needs keyframes that are restored: --restore or a dense map, and what moves removed");
+        "--models", "needs restored keyframes: --restore or a dense map, and --dynamic other than none");
   if (arguments.restore && !options.keyframes.enabled)
-    throw CLI::ValidationError("--restore", "restores keyframes, of which --localise-only makes none");
-  if (arguments.restore && !options.removal.is_on())
+    throw CLI::ValidationError("--restore", "restores keyframes, and --localise-only creates none");
+  if (arguments.restore && !options.dynamic_objects.is_on())
     throw CLI::ValidationError("--restore", "has nothing to restore with --dynamic none");
   if (!options.keyframes.enabled && arguments.map.empty()) {
-    throw CLI::ValidationError("--localise-only", "needs --map, a map to find the camera in");
+    throw CLI::ValidationError("--localise-only", "needs --map, the map to localise in");
   }
 }
 
@@ -116,9 +121,9 @@ void execute(RunArguments arguments, const std::string& version) {
     return;
   }
   check(arguments.flight, options);
-  const InterruptWatcher interrupt;
+  const InterruptWatcher interrupt(InterruptWatcher::kTwice);
   arguments.flight.quiet |= arguments.json;
-  const Flight flight = fly(arguments.flight, options, version, interrupt.token());
+  const Flight flight = fly(arguments.flight, options, version, interrupt.token(), interrupt.urgent_token());
   if (arguments.json) {
     const auto report = run_report(*flight.slam, flight.summary, *flight.source, flight.description);
     std::cout << nlohmann::json::parse(report).dump() << "\n";
@@ -132,67 +137,71 @@ void execute(RunArguments arguments, const std::string& version) {
 
 void add_run_command(CLI::App& program, const std::string& version) {
   const auto arguments = std::make_shared<RunArguments>();
-  CLI::App* command =
-      program.add_subcommand("run", "Track a recorded or simulated flight and map what it sees");
+  CLI::App* command = program.add_subcommand(
+      "run", "Track the camera of a recorded or simulated flight and map the static scene");
   command->footer(
       "Examples:\n"
       "  roslam run simulated:street --out street\n"
       "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n"
       "  roslam run my_flight --camera my_camera.yaml --real-time --out live\n"
       "  roslam run another_flight --map live/map.roslam --out further\n"
-      "RUN then holds report.html to look at, trajectory.txt and keyframes.txt (TUM format), dense.ply and "
-      "dense.bt\n"
-      "(the dense map), map.ply, map.roslam, trajectory.png and run.json.\n"
-      "Ctrl-C ends the run early and writes what was computed so far (exit code 0, \"interrupted\" in "
-      "run.json).");
+      "Writes to the folder RUN of --out:\n"
+      "  report.html trajectory.png   the run in figures and tables\n"
+      "  trajectory.txt keyframes.txt camera poses of frames and keyframes (TUM format)\n"
+      "  groundtruth.txt              true poses, where the source has them (TUM format)\n"
+      "  dense.ply dense.bt           dense map: points and triangles; free and occupied space (OctoMap)\n"
+      "  map.ply map.roslam           landmarks; the map file for --map and roslam map\n"
+      "  descriptors.jsonl masks/     dynamic objects of each frame and their masks\n"
+      "  removal.jpg restoration.jpg  sample images: points removed; keyframes restored\n"
+      "  run.json                     options, counts, processor times, memory\n"
+      "Ctrl-C ends the run early and writes the results so far (\"interrupted\" in run.json); a second one leaves out\n"
+      "the dense map, a third ends the program at once.\n"
+      "Exit code: 0 success, 1 an error in the input, 2 wrong usage.");
   add_source_options(*command, arguments->flight.source);
   command->add_option("--out", arguments->flight.out,
-                      "Folder the results are written to; made if it does not exist");
+                      "Folder the results are written to; made if it does not exist (required)");
   command->add_option("--config", arguments->flight.config,
-                      "YAML file with options; --print-config shows them all");
+                      "YAML file with options; --print-config prints all of them");
   auto* deterministic =
       command->add_flag("--deterministic", arguments->flight.deterministic,
-                        "One stage after the other: the same input gives the same bytes (default)");
+                        "Run the stages one after the other: the same input gives the same bytes (default)");
   command
       ->add_flag(
           "--real-time", arguments->flight.real_time,
-          "Stages on threads, frames at the pace of their timestamps; late frames are dropped and counted")
+          "Run the stages in parallel, read frames at the pace of their timestamps, drop and count late ones")
       ->excludes(deterministic);
   command
       ->add_option(
           "--dynamic", arguments->flight.dynamic,
-          "How what moves is found and removed: none, labels (a network's persons, cars, bicycles), geometry "
-          "(depth and optical flow) or both; default both, or as --config says. For comparison: "
-          "ds-slam-like, "
-          "dynaslam-like")
-      ->check(CLI::IsMember(removal_modes()));
-  command->add_option(
-      "--model", arguments->flight.model,
-      "Weights of the network that labels (ONNX), in place of those that come with the program");
+          "Detection of the dynamic objects to remove: none, labels (segmentation network: persons, cars, "
+          "bicycles), geometry (depth and optical flow) or both; default both, unless --config differs. For "
+          "comparison: ds-slam-like, dynaslam-like")
+      ->check(CLI::IsMember(dynamic_modes()));
+  command->add_option("--model", arguments->flight.model,
+                      "Weights of the segmentation network (ONNX); default the shipped ones");
   command->add_option("--vocabulary", arguments->flight.vocabulary,
-                      "Words that places are recognised by, in place of those that come with the program");
-  command->add_flag(
-      "--no-loops", arguments->flight.no_loops,
-      "Recognise no places by their words and close no loops; the path is then as odometry has it");
+                      "Vocabulary for place recognition (roslam vocabulary train); default the shipped one");
+  command->add_flag("--no-loops", arguments->flight.no_loops,
+                    "Do no place recognition and close no loops: drift is not corrected");
   command->add_option("--map", arguments->flight.map,
-                      "Go on from the map of an earlier flight with this camera (map.roslam of its folder)");
+                      "Continue from the map of an earlier run with the same camera (its map.roslam)");
   command->add_flag("--localise-only", arguments->flight.localise_only,
-                    "Find the camera in --map and leave the map as it is");
+                    "Localise in --map without changing the map");
   add_flight_options(*command, arguments->flight.source);
-  command->add_flag("--print-config", arguments->print_config, "Print the effective options and stop");
+  command->add_flag("--print-config", arguments->print_config, "Print the effective options (YAML) and exit");
   command->add_flag("--video", arguments->flight.video,
-                    "Write removal.avi too: each frame with what was kept and what was removed");
+                    "Write removal.avi too: each frame with kept and removed points");
   command->add_flag("--no-dense", arguments->flight.no_dense,
-                    "Make no dense map, and restore no keyframes for it");
+                    "Build no dense map, and restore no keyframes for it");
   command->add_flag(
       "--restore", arguments->flight.restore,
-      "Write the keyframes as they go into the dense map to RUN/restored: what the removal leaves open is "
-      "filled from those before and by a network; roslam restore does more, afterwards, with all frames");
+      "Write restored keyframes to RUN/restored, as fused into the dense map: removed objects are "
+      "filled from earlier keyframes and by inpainting; roslam restore does it later for all frames");
   command->add_option(
       "--models", arguments->flight.models,
-      "Folder of the networks that paint what nobody saw, in place of those that come with the program");
-  command->add_flag("--quiet", arguments->flight.quiet, "No progress");
-  command->add_flag("--json", arguments->json, "Print the report as one JSON object");
+      "Folder with the inpainting networks (roslam-restorer-*.onnx); default the shipped ones");
+  command->add_flag("--quiet", arguments->flight.quiet, "Print no progress");
+  command->add_flag("--json", arguments->json, "Print run.json on stdout as one JSON object");
   command->callback([arguments, version] { execute(*arguments, version); });
 }
 

@@ -11,18 +11,20 @@
 #include <system_error>
 #include <vector>
 
-#include "apps/roslam/commands.hpp"
-#include "apps/roslam/interrupt.hpp"
-#include "apps/roslam/output.hpp"
-#include "apps/roslam/progress.hpp"
-#include "roslam/error.hpp"
-#include "roslam/evaluation/markdown_table.hpp"
-#include "roslam/evaluation/statistics.hpp"
+#include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/image_source.hpp"
+#include "apps/roslam/support/interrupt.hpp"
+#include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/progress.hpp"
+#include "evaluation/plots/markdown_table.hpp"
+#include "evaluation/statistics.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/write_file.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
-#include "roslam/sources/picture_source.hpp"
-#include "roslam/write_file.hpp"
 
 namespace roslam::app {
+
+using namespace evaluation;
 
 namespace {
 namespace fs = std::filesystem;
@@ -40,16 +42,16 @@ struct SegmentArguments {
   bool json = false;
 };
 
-// What was found over all pictures.
-struct Findings {
-  std::size_t pictures = 0;
+// Sums over all images.
+struct LabelStatistics {
+  std::size_t images = 0;
   double pixels = 0.0;
   std::array<double, kClasses> areas{};        // pixels
   std::array<double, kClasses> confidences{};  // weighted by area
   std::vector<double> milliseconds;
 
   void add(const Segmentation& segmentation) {
-    ++pictures;
+    ++images;
     pixels += static_cast<double>(segmentation.labels.total());
     std::array<double, kClasses> counts{};
     for (auto it = segmentation.labels.begin<std::uint8_t>(); it != segmentation.labels.end<std::uint8_t>();
@@ -67,12 +69,12 @@ struct Findings {
   double confidence(std::size_t c) const { return areas[c] > 0.0 ? confidences[c] / areas[c] : 0.0; }
 };
 
-std::set<fs::path> folders_of_pictures(const std::vector<std::string>& inputs) {
+std::set<fs::path> folders_of_images(const std::vector<std::string>& inputs) {
   std::set<fs::path> folders;
   for (const fs::path path : inputs) {
     std::error_code error;
     if (fs::is_directory(path, error)) {
-      for (const auto& file : pictures_in(path)) folders.insert(file.parent_path());
+      for (const auto& file : images_in(path)) folders.insert(file.parent_path());
     } else {
       folders.insert(fs::absolute(path).parent_path());
     }
@@ -80,14 +82,14 @@ std::set<fs::path> folders_of_pictures(const std::vector<std::string>& inputs) {
   return folders;
 }
 
-// Labels and overlays are named as the pictures: in their folder they would replace them.
+// Labels and overlays have the names of the images: in the same folder they would overwrite them.
 void protect_inputs(const SegmentArguments& arguments) {
-  for (const auto& folder : folders_of_pictures(arguments.inputs)) {
+  for (const auto& folder : folders_of_images(arguments.inputs)) {
     for (const auto& written : {arguments.out, arguments.out / "overlay"}) {
       std::error_code error;
       if ((written == arguments.out || arguments.overlay) && fs::equivalent(folder, written, error)) {
         throw OutputError(written.string() +
-                          ": holds the pictures, which labels could replace; choose another --out");
+                          ": holds the images, which labels could replace; choose another --out");
       }
     }
   }
@@ -95,16 +97,16 @@ void protect_inputs(const SegmentArguments& arguments) {
 
 fs::path model_of(const SegmentArguments& arguments) {
   if (!arguments.model.empty()) return arguments.model;
-  const fs::path shipped = shipped_segmentation_model();
+  const fs::path shipped = find_segmentation_model();
   if (shipped.empty()) throw missing_segmentation_model();
   return shipped;
 }
 
-Json summary_json(const SegmentArguments& arguments, const fs::path& model, const Findings& found,
-                  const PictureSource& source, bool interrupted) {
+Json summary_json(const SegmentArguments& arguments, const fs::path& model, const LabelStatistics& found,
+                  const ImageSource& source, bool interrupted) {
   Json json{{"classes", arguments.classes}, {"out", arguments.out.string()},
             {"model", model.string()},      {"working_side", arguments.options.working_side},
-            {"pictures", found.pictures},   {"interrupted", interrupted},
+            {"images", found.images},       {"interrupted", interrupted},
             {"skipped", source.skipped()},  {"processor_milliseconds", median(found.milliseconds)},
             {"by_class", Json::object()}};
   for (std::size_t c = 0; c < kClasses; ++c) {
@@ -114,7 +116,8 @@ Json summary_json(const SegmentArguments& arguments, const fs::path& model, cons
   return json;
 }
 
-void print_summary(const SegmentArguments& arguments, const Findings& found, const PictureSource& source) {
+void print_summary(const SegmentArguments& arguments, const LabelStatistics& found,
+                   const ImageSource& source) {
   std::vector<TableRow> rows{{"class", "share of pixels", "confidence"}};
   for (std::size_t c = 0; c < kClasses; ++c) {
     if (found.areas[c] > 0.0) {
@@ -123,46 +126,46 @@ void print_summary(const SegmentArguments& arguments, const Findings& found, con
     }
   }
   std::cout << markdown_table(rows) << "\n";
-  std::cout << "labelled " << found.pictures << " pictures, median " << fixed(median(found.milliseconds), 1)
+  std::cout << "labelled " << found.images << " images, median " << fixed(median(found.milliseconds), 1)
             << " ms of processor time from image to labels\n";
   for (const auto& [reason, count] : source.skipped())
     std::cout << "skipped " << count << ": " << reason << "\n";
   std::cout << "results: " << arguments.out.string() << "\n";
 }
 
-Findings label_all(const SegmentArguments& arguments, const LabelSet& set, PictureSource& source,
-                   Segmenter& segmenter, const std::stop_token& stop) {
-  Findings found;
+LabelStatistics label_all(const SegmentArguments& arguments, const LabelSet& set, ImageSource& source,
+                          Segmenter& segmenter, const std::stop_token& stop) {
+  LabelStatistics found;
   Progress progress(source.size(), arguments.quiet || arguments.json);
   while (!stop.stop_requested()) {
-    const auto picture = source.next();
-    if (!picture) break;
-    const Segmentation segmentation = segmenter.segment(picture->image);
+    const auto image = source.next();
+    if (!image) break;
+    const Segmentation segmentation = segmenter.segment(image->image);
     found.add(segmentation);
-    write_picture(arguments.out / (picture->name + ".png"), relabel(segmentation.labels, set));
+    write_image_fast(arguments.out / (image->name + ".png"), relabel(segmentation.labels, set));
     if (arguments.overlay) {
-      write_picture(arguments.out / "overlay" / (picture->name + ".jpg"),
-                    label_overlay(picture->image, segmentation.labels));
+      write_image_fast(arguments.out / "overlay" / (image->name + ".jpg"),
+                  label_overlay(image->image, segmentation.labels));
     }
-    progress.show(found.pictures, "labelled");
+    progress.show(found.images, "labelled");
   }
   return found;
 }
 
 void segment(const SegmentArguments& arguments) {
-  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // FFmpeg's own lines say less than ours
+  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // our error message replaces FFmpeg's lines
   const InterruptWatcher interrupt;
   const LabelSet set = *label_set_from(arguments.classes);
   const fs::path model = model_of(arguments);
   PspnetSegmenter segmenter(model, arguments.options, arguments.backend);
-  const auto source = open_pictures({arguments.inputs.begin(), arguments.inputs.end()});
+  const auto source = open_images({arguments.inputs.begin(), arguments.inputs.end()});
   protect_inputs(arguments);
   make_folder(arguments.overlay ? arguments.out / "overlay" : arguments.out);
-  const Findings found = label_all(arguments, set, *source, segmenter, interrupt.token());
+  const LabelStatistics found = label_all(arguments, set, *source, segmenter, interrupt.token());
   const bool interrupted = interrupt.token().stop_requested();
-  if (found.pictures == 0 && !interrupted) {
-    throw InputError(arguments.inputs.front() + ": no picture could be labelled" +
-                     in_words(source->skipped()) + "; check the files");
+  if (found.images == 0 && !interrupted) {
+    throw InputError(arguments.inputs.front() + ": no image could be labelled" + in_words(source->skipped()) +
+                     "; check the files");
   }
   const Json summary = summary_json(arguments, model, found, *source, interrupted);
   write_file(arguments.out / "labels.json",
@@ -178,33 +181,33 @@ void segment(const SegmentArguments& arguments) {
 
 void add_segment_command(CLI::App& program) {
   const auto arguments = std::make_shared<SegmentArguments>();
-  CLI::App* command =
-      program.add_subcommand("segment", "Label every pixel of pictures: road, building, person, car ...");
+  CLI::App* command = program.add_subcommand(
+      "segment", "Label each pixel of images by class: road, building, person, car ...");
   command->footer(
       "Examples:\n"
       "  roslam segment street.jpg --out labels --overlay\n"
       "  roslam segment rgbd_dataset_freiburg3_walking_xyz --out labels --classes person\n"
       "  roslam segment flight.mp4 --out labels --overlay --working-side 512\n"
-      "DIR then holds a PNG of labels for each picture, named as it, labels.json (classes, areas, speed) "
-      "and, with\n"
-      "--overlay, pictures with the labels drawn over them. Classes of the labels: cityscapes19 (0-18), "
-      "groups8 (flat,\n"
-      "building, pole, nature, sky, person, car, bicycle; 0-7), camvid11 (0-10), person (255, else 0).");
+      "Writes to the folder of --out a label image (PNG, 8 bit) for each image, named as it, labels.json\n"
+      "(classes, share of pixels, confidence, processor time) and, with --overlay, the images with their\n"
+      "labels to overlay/. Values of the labels: cityscapes19 0-18; groups8 0-7 (flat, building, pole,\n"
+      "nature, sky, person, car, bicycle); camvid11 0-10; person 255, else 0.\n"
+      "Ctrl-C ends it early and keeps the labels so far.\n"
+      "Exit code: 0 success, 1 an error in the input, 2 wrong usage.");
   command
-      ->add_option("INPUT", arguments->inputs,
-                   "Pictures, folders of pictures, TUM RGB-D folders, or one video")
+      ->add_option("INPUT", arguments->inputs, "Images, folders of images, TUM RGB-D folders, or one video")
       ->required();
   command->add_option("--out", arguments->out, "Folder the labels are written to; made if it does not exist")
       ->required();
-  command->add_option("--classes", arguments->classes, "Classes of the labels")
+  command->add_option("--classes", arguments->classes, "Classes of the labels written")
       ->check(CLI::IsMember(label_set_names()))
       ->capture_default_str();
-  command->add_flag("--overlay", arguments->overlay, "Also write pictures with the labels drawn over them");
+  command->add_flag("--overlay", arguments->overlay, "Also write the images with the labels drawn over them");
   command->add_option("--model", arguments->model,
-                      "Weights (ONNX) in place of those that come with the program");
+                      "Weights of the segmentation network (ONNX); default the shipped ones");
   command
       ->add_option("--working-side", arguments->options.working_side,
-                   "Longer side of the picture the network sees, in pixels: less is faster, more is finer")
+                   "Longer side of the network's input, pixels: less is faster, more is finer")
       ->check(CLI::Range(32, 4096))
       ->capture_default_str();
   const std::map<std::string, InferenceBackend> backends{{"auto", InferenceBackend::kAutomatic},
@@ -212,11 +215,11 @@ void add_segment_command(CLI::App& program) {
                                                          {"onnxruntime", InferenceBackend::kOnnxRuntime}};
   command
       ->add_option("--backend", arguments->backend,
-                   "What runs the network; auto is ONNX Runtime where built with it")
+                   "Inference backend; default auto: ONNX Runtime where built with it, else OpenCV")
       ->transform(CLI::CheckedTransformer(backends).description(""))
       ->type_name("auto|opencv|onnxruntime");
-  command->add_flag("--quiet", arguments->quiet, "No progress");
-  command->add_flag("--json", arguments->json, "Print the summary as one JSON object");
+  command->add_flag("--quiet", arguments->quiet, "Print no progress");
+  command->add_flag("--json", arguments->json, "Print the summary as one JSON object on stdout");
   command->callback([arguments] { segment(*arguments); });
 }
 

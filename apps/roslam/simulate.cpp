@@ -7,14 +7,16 @@
 #include <string>
 #include <vector>
 
-#include "apps/roslam/commands.hpp"
-#include "apps/roslam/output.hpp"
-#include "apps/roslam/progress.hpp"
-#include "apps/roslam/tum_writer.hpp"
-#include "roslam/sources/simulated_source.hpp"
-#include "roslam/write_file.hpp"
+#include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/progress.hpp"
+#include "apps/roslam/support/tum_writer.hpp"
+#include "roslam/common/write_file.hpp"
+#include "simulation/simulated_source.hpp"
 
 namespace roslam::app {
+
+using namespace simulation;
 namespace {
 
 namespace fs = std::filesystem;
@@ -30,22 +32,23 @@ struct SimulateArguments {
   bool json = false;
 };
 
-constexpr const char* kHelp = R"(Render a drone's flight through a street, with everything known about it.
+constexpr const char* kHelp =
+    R"(Houses, trees, cars and people are generated from the seed; nothing is downloaded.
+The output is a TUM RGB-D folder for roslam run, of the camera preset simulated.
 
-Nothing is downloaded: houses, trees, cars and people are made up from the seed. The folder can be given to
-`roslam run` as any recorded one in the TUM format; the truth lies beside it.
-
-Example, ten seconds among many cars and people:
+Example, ten seconds with many cars and people:
   roslam simulate street --traffic heavy --frames 300 --out flight
 
-Writes to the folder, images named after their time in seconds:
+Writes to the folder of --out; images are named after their timestamp in seconds:
   rgb/ rgb.txt            colour
-  depth/ depth.txt        depth, 16 bit, 1000 a metre, 0 = unknown
-  groundtruth.txt         camera poses: time, position (m), quaternion x y z w
-  camera.yaml             the camera, for --camera
-  labels/                 class of each pixel: Cityscapes train ids, 255 = none of them
-  instances/              which moving thing each pixel shows, 16 bit, 0 = none
-  background/rgb, depth   the same views without anything that can move, parked cars included)";
+  depth/ depth.txt        depth, 16 bit, 1000 per metre, 0 = unknown
+  groundtruth.txt         camera poses: timestamp (s), position (m), quaternion x y z w
+  camera.yaml             camera parameters, for --camera of roslam run
+  labels/                 8 bit: class of each pixel, Cityscapes train ids, 255 = none of them
+  instances/              16 bit: number of the moving object, 0 = none
+  background/rgb, depth   the same images without movable objects, parked cars included
+
+Exit code: 0 success, 1 an error in the input, 2 wrong usage.)";
 
 std::string pose_line(double timestamp, const SE3& pose) {
   const auto& t = pose.translation();
@@ -58,13 +61,13 @@ std::string pose_line(double timestamp, const SE3& pose) {
 
 void write_images(const fs::path& out, const std::string& name, const SimulatedView& view,
                   const Camera& camera) {
-  write_picture(out / "rgb" / name, view.frame.colour);
-  write_picture(out / "depth" / name, packed_depth(view.frame.depth, camera.depth_units_per_metre));
-  write_picture(out / "labels" / name, view.frame.labels);
-  write_picture(out / "instances" / name, view.instances);
-  write_picture(out / "background" / "rgb" / name, view.background_colour);
-  write_picture(out / "background" / "depth" / name,
-                packed_depth(view.background_depth, camera.depth_units_per_metre));
+  write_image_fast(out / "rgb" / name, view.frame.colour);
+  write_image_fast(out / "depth" / name, packed_depth(view.frame.depth, camera.depth_units_per_metre));
+  write_image_fast(out / "labels" / name, view.frame.labels);
+  write_image_fast(out / "instances" / name, view.instances);
+  write_image_fast(out / "background" / "rgb" / name, view.background_colour);
+  write_image_fast(out / "background" / "depth" / name,
+              packed_depth(view.background_depth, camera.depth_units_per_metre));
 }
 
 void simulate(const SimulateArguments& arguments) {
@@ -116,29 +119,36 @@ void simulate(const SimulateArguments& arguments) {
 
 void add_simulate_command(CLI::App& program) {
   auto arguments = std::make_shared<SimulateArguments>();
-  CLI::App* command = program.add_subcommand("simulate", kHelp);
+  CLI::App* command = program.add_subcommand(
+      "simulate", "Render a simulated flight of a drone through a street, with ground truth");
+  command->footer(kHelp);
   command
       ->add_option(
           "path", arguments->path,
-          "street: 50 m along a street; loop: around a block; hover: turns on the spot; turn: round a corner")
+          "Flight path: street, 50 m along a street; loop, around a block; hover, turning on the spot; turn, "
+          "around a corner")
       ->required()
       ->check(CLI::IsMember({"street", "loop", "hover", "turn"}));
-  command->add_option("--out", arguments->out, "Folder to write to; made where it is missing")->required();
-  command->add_option("--traffic", arguments->traffic, "none (parked cars only), light or heavy")
+  command->add_option("--out", arguments->out, "Folder the sequence is written to; made if it does not exist")
+      ->required();
+  command
+      ->add_option("--traffic", arguments->traffic,
+                   "Amount of moving cars and people: none (parked cars only), light or heavy")
       ->check(CLI::IsMember({"none", "light", "heavy"}))
       ->capture_default_str();
   command
       ->add_option("--frames", arguments->frames,
-                   "How many frames to write, 30 a second; default the whole flight")
+                   "Number of frames to write, 30 per second; default the whole flight")
       ->check(CLI::PositiveNumber);
   command
-      ->add_option("--depth", arguments->depth, "ideal, or d455: with the noise and holes of such a camera")
+      ->add_option("--depth", arguments->depth,
+                   "Depth sensor: ideal, or d455 with the noise and holes of a RealSense D455")
       ->check(CLI::IsMember({"ideal", "d455"}))
       ->capture_default_str();
-  command->add_option("--seed", arguments->seed, "Another number makes another city")
+  command->add_option("--seed", arguments->seed, "Seed of the generated street and traffic")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_flag("--json", arguments->json, "Print a summary as one JSON object");
+  command->add_flag("--json", arguments->json, "Print the summary as one JSON object on stdout");
   command->callback([arguments] { simulate(*arguments); });
 }
 

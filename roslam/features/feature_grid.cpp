@@ -28,7 +28,7 @@ FeatureGrid::FeatureGrid(std::span<const Eigen::Vector2f> points, const std::arr
 }
 
 int FeatureGrid::column(float x) const {
-  // Clamped first: a pixel may lie farther outside than an int can say.
+  // Clamped before the cast, as a pixel may lie outside the range of int.
   return static_cast<int>(std::clamp((x - min_.x()) * cells_per_pixel_.x(), 0.0F, kColumns - 1.0F));
 }
 

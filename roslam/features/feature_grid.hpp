@@ -7,10 +7,12 @@
 #include <span>
 #include <vector>
 
+#include "roslam/common/export.hpp"
+
 namespace roslam {
 
-/// Finds the points of an image near a pixel without looking at all of them.
-class FeatureGrid {
+/// Grid index over the points of an image: finds those near a pixel.
+class ROSLAM_EXPORT FeatureGrid {
  public:
   FeatureGrid() = default;
 
@@ -33,7 +35,7 @@ class FeatureGrid {
   Eigen::Vector2f min_ = Eigen::Vector2f::Zero();
   Eigen::Vector2f max_ = Eigen::Vector2f::Zero();
   Eigen::Vector2f cells_per_pixel_ = Eigen::Vector2f::Zero();
-  std::vector<Eigen::Vector2f> points_;    // in the order of cells
+  std::vector<Eigen::Vector2f> points_;    // ordered by cell
   std::vector<std::uint32_t> indices_;     // original index of each entry of points_
   std::vector<std::uint32_t> cell_begin_;  // kColumns * kRows + 1 offsets into points_
 };

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam {
 
@@ -52,8 +52,8 @@ ObservedFrame observe(std::span<const OrbFeature> features, const cv::Mat& colou
   frame.colours.reserve(count);
   frame.descriptors.reserve(count);
   for (const auto& feature : features) {
-    const Eigen::Vector2d taken(feature.pixel.x, feature.pixel.y);
-    frame.pixels.push_back(camera.undistort(taken).cast<float>());
+    const Eigen::Vector2d pixel(feature.pixel.x, feature.pixel.y);
+    frame.pixels.push_back(camera.undistort(pixel).cast<float>());
     frame.depths.push_back(depth.empty() ? 0.0F : depth_at(depth, feature.pixel, options));
     frame.levels.push_back(static_cast<std::uint8_t>(feature.level));
     frame.angles.push_back(feature.angle);

@@ -7,28 +7,28 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam {
 
 namespace {
 constexpr int kPatchRadius = 15;  // pixels of a level: the patch ORB describes is 31 wide
-constexpr int kBorder = 19;       // pixels of a level left out, so that the rotated patch stays inside
+constexpr int kBorder = 19;       // pixels of a level without points, so that the rotated patch stays inside
 constexpr int kFastRadius = 3;    // pixels of a level FAST looks around a corner
 
 void require(bool condition, const char* message) {
   if (!condition) throw OptionsError(std::string("orb.") + message);
 }
 
-// Where a pixel of a level lies in the full image. Sides of levels are whole pixels: 0.2 % beside the nominal
-// scale, which along the width of an image is a pixel, and for a camera that approaches a false speed.
+// Maps a pixel of a level to the full image. The sides of levels are rounded to whole pixels, up to 0.2 % off
+// the nominal scale: about a pixel over the width of an image, which would bias forward motion.
 class ToFullImage {
  public:
   ToFullImage(const cv::Size& full, const cv::Size& level)
       : x_(static_cast<float>(full.width) / static_cast<float>(level.width)),
         y_(static_cast<float>(full.height) / static_cast<float>(level.height)) {}
 
-  // Centres of pixels, not their corners, lie at whole numbers.
+  // Integer coordinates are pixel centres, not corners.
   cv::Point2f operator()(const cv::Point2f& pixel) const {
     return {(pixel.x + 0.5F) * x_ - 0.5F, (pixel.y + 0.5F) * y_ - 0.5F};
   }
@@ -38,7 +38,7 @@ class ToFullImage {
   float y_;
 };
 
-// Serves the cells of a grid in turns, strongest point first, until enough points are chosen.
+// Picks points round-robin from the cells of a grid, strongest first in each cell, until there are enough.
 std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint>& points, const cv::Size& size, int wanted) {
   if (static_cast<int>(points.size()) <= wanted) return points;
   const double side = std::sqrt(static_cast<double>(size.area()) / wanted);
@@ -52,7 +52,7 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint>& points, const cv::Si
     if (a.response != b.response) return a.response > b.response;
     return a.pt.y != b.pt.y ? a.pt.y < b.pt.y : a.pt.x < b.pt.x;
   });
-  // The turn in which a point is served is its rank within its cell.
+  // The round in which a point is picked is its rank within its cell.
   int rank = 0;
   for (std::size_t i = 0, previous_cell = points.size(); i < points.size(); ++i) {
     const auto cell = static_cast<std::size_t>(points[i].class_id);
@@ -70,8 +70,7 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint>& points, const cv::Si
   return points;
 }
 
-// Direction from the centre of a round patch to its intensity centroid, in degrees (Rublee et al. 2011, eq.
-// 3).
+// Direction from the centre of a round patch to its intensity centroid (Rublee et al. 2011, eq. 3), degrees.
 float orientation(const cv::Mat& image, const cv::Point& centre, const std::vector<int>& circle) {
   int moment_x = 0;
   int moment_y = 0;
@@ -152,7 +151,7 @@ std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyram
   std::vector<cv::KeyPoint> all;
   const double masked_share =
       mask.empty() ? 0.0 : static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
-  int surplus = 0;  // what coarser or finer levels could not fill is passed on
+  int surplus = 0;  // quota that finer levels could not fill, passed on to coarser ones
   for (std::size_t level = 0; level < pyramid.size(); ++level) {
     const ToFullImage to_full_image(pyramid.front().size(), pyramid[level].size());
     auto points = corners(pyramid[level]);
@@ -162,10 +161,10 @@ std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyram
         return mask.at<uchar>(cvRound(pixel.y), cvRound(pixel.x)) == 0;
       });
       if (removed != nullptr) {
-        std::vector<cv::KeyPoint> forbidden(masked, points.end());
+        std::vector<cv::KeyPoint> rejected(masked, points.end());
         const int share = static_cast<int>(std::lround(masked_share * quotas_[level]));
         if (share > 0) {
-          for (const auto& p : spread(forbidden, pyramid[level].size(), share))
+          for (const auto& p : spread(rejected, pyramid[level].size(), share))
             removed->push_back(to_full_image(p.pt));
         }
       }
@@ -194,7 +193,7 @@ std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat
                                               std::vector<cv::Point2f>* removed) const {
   if (grey.empty() || grey.type() != CV_8UC1) throw InputError("ORB extraction needs an 8-bit grey image");
   if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
-    throw InputError("the mask of ORB extraction must be an 8-bit image of the size of the picture");
+    throw InputError("the mask of ORB extraction must be an 8-bit image of the size of the image");
   }
   std::vector<cv::Mat> pyramid{grey};
   for (std::size_t level = 1; level < scales_.size(); ++level) {

@@ -5,26 +5,15 @@
 #include <opencv2/features2d.hpp>
 #include <vector>
 
+#include "roslam/common/export.hpp"
 #include "roslam/features/descriptor.hpp"
+#include "roslam/features/feature_options.hpp"
 
 namespace roslam {
 
-struct OrbOptions {
-  int features = 1000;         ///< points wanted in an image
-  int levels = 8;              ///< pyramid levels
-  double scale_factor = 1.2;   ///< size ratio between levels
-  int fast_threshold = 20;     ///< grey levels a corner must stand out by
-  int min_fast_threshold = 7;  ///< grey levels, tried where a cell has no corner at fast_threshold
-  int cell_size = 64;          ///< pixels, side of the cells the threshold adapts in
-  int mask_margin = 4;         ///< pixels around masked pixels that give no point either
-
-  /// Throws OptionsError naming the field.
-  void validate() const;
-};
-
 /// A point with its descriptor.
-struct OrbFeature {
-  cv::Point2f pixel;   ///< in the full-size image as taken
+struct ROSLAM_EXPORT OrbFeature {
+  cv::Point2f pixel;   ///< in the full-size raw (distorted) image
   int level = 0;       ///< pyramid level it was found on
   float angle = 0.0F;  ///< degrees, orientation of the patch
   Descriptor descriptor{};
@@ -32,21 +21,21 @@ struct OrbFeature {
 
 /// Extracts ORB features (Rublee et al. 2011): FAST corners on an image pyramid, oriented by the intensity
 /// centroid and described by rotated BRIEF. Points are spread evenly over levels and over the image: each
-/// level has a share of the budget by its side length, and within a level a grid of as many cells as points
-/// wanted is served in turns.
-class OrbExtractor {
+/// level has a share of the budget proportional to its side length; within a level, points are picked
+/// round-robin from a grid of as many cells as points wanted.
+class ROSLAM_EXPORT OrbExtractor {
  public:
   /// Throws OptionsError.
   explicit OrbExtractor(const OrbOptions& options = {});
 
-  /// grey: CV_8UC1. mask: empty, or CV_8UC1 of the same size, nonzero where no point may come from (eq. 11).
-  /// The result is ordered by level. removed: if not null, takes the corners that would have been points but
-  /// for the mask (pixels of the full-size image), about as dense as points are elsewhere. Throws InputError
-  /// for another type or a mask of another size.
+  /// grey: CV_8UC1. mask: empty, or CV_8UC1 of the same size, nonzero where points are rejected (paper, eq.
+  /// 11). The result is ordered by level. removed: if not null, receives the corners rejected by the mask
+  /// (pixels of the full-size image), about as dense as the points elsewhere. Throws InputError for another
+  /// type or a mask of another size.
   std::vector<OrbFeature> extract(const cv::Mat& grey, const cv::Mat& mask = {},
                                   std::vector<cv::Point2f>* removed = nullptr) const;
 
-  /// Where a mask lets no point be: the mask with mask_margin around it. CV_8UC1.
+  /// The mask dilated by mask_margin (CV_8UC1): where points are rejected.
   cv::Mat forbidden(const cv::Mat& mask) const;
 
   const OrbOptions& options() const { return options_; }

@@ -10,7 +10,7 @@ namespace roslam {
 
 namespace {
 constexpr std::size_t kMinPoints = 3;
-// Spread below this share of the points' magnitude is rounding, not movement.
+// Spread below this fraction of the points' magnitude is rounding, not motion.
 constexpr double kRelativeRounding = 1e-12;
 
 using Points = Eigen::Matrix3Xd;
@@ -26,7 +26,7 @@ bool coincide(const Points& points, const Points& centred) {
 }
 }  // namespace
 
-std::optional<Alignment> align(const std::vector<Eigen::Vector3d>& source,
+std::optional<Alignment> align_points(const std::vector<Eigen::Vector3d>& source,
                                const std::vector<Eigen::Vector3d>& target, AlignmentModel model) {
   if (source.size() < kMinPoints || source.size() != target.size()) return std::nullopt;
   const Points from = columns(source);
@@ -43,8 +43,7 @@ std::optional<Alignment> align(const std::vector<Eigen::Vector3d>& source,
   Eigen::Matrix3d rotation = similarity.topLeftCorner<3, 3>();
   if (with_scale) {
     alignment.scale = std::cbrt(rotation.determinant());
-    if (!(alignment.scale > 0.0))
-      return std::nullopt;  // the target is one spot: every scale but zero is worse
+    if (!(alignment.scale > 0.0)) return std::nullopt;  // the target points coincide: the best scale is zero
     rotation /= alignment.scale;
   }
   alignment.T_target_source = SE3(rotation, similarity.topRightCorner<3, 1>());
@@ -58,15 +57,15 @@ std::optional<Alignment> align(const std::vector<Eigen::Vector3d>& source,
 
 std::optional<SE3> align_poses(const std::vector<SE3>& source, const std::vector<SE3>& target) {
   if (source.empty() || source.size() != target.size()) return std::nullopt;
-  // The outer product, as a quaternion and its negative are one rotation.
+  // Sum of outer products, which is the same for a quaternion and its negative (one rotation).
   Eigen::Matrix4d products = Eigen::Matrix4d::Zero();
   for (std::size_t i = 0; i < source.size(); ++i) {
     if (!source[i].is_finite() || !target[i].is_finite()) return std::nullopt;
-    const Eigen::Vector4d turn = (target[i].rotation() * source[i].rotation().conjugate()).coeffs();
-    products += turn * turn.transpose();
+    const Eigen::Vector4d quaternion = (target[i].rotation() * source[i].rotation().conjugate()).coeffs();
+    products += quaternion * quaternion.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(products);
-  const Eigen::Quaterniond rotation(Eigen::Vector4d(solver.eigenvectors().col(3)));  // of the largest value
+  const Eigen::Quaterniond rotation(Eigen::Vector4d(solver.eigenvectors().col(3)));  // largest eigenvalue
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < source.size(); ++i)
     translation += target[i].translation() - rotation * source[i].translation();

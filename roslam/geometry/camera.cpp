@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam {
 
@@ -15,7 +15,7 @@ void require(bool condition, const std::string& message) {
   if (!condition) throw CalibrationError("camera calibration: " + message);
 }
 
-// True if distortion can be undone in all but a few pixels, say those of an extreme corner.
+// True if distortion can be inverted in all but a few pixels, such as those of an extreme corner.
 bool is_invertible(const Camera& camera) {
   constexpr int kSteps = 16;  // along each side of a grid over the image
   constexpr int kFewPoints = (kSteps + 1) * (kSteps + 1) / 10;
@@ -23,9 +23,9 @@ bool is_invertible(const Camera& camera) {
   int failures = 0;
   for (int i = 0; i <= kSteps; ++i) {
     for (int j = 0; j <= kSteps; ++j) {
-      const Eigen::Vector2d taken((camera.width - 1.0) * i / kSteps, (camera.height - 1.0) * j / kSteps);
-      const Eigen::Vector2d back = camera.distort(camera.undistort(taken));
-      if (!((back - taken).norm() < kTolerance)) ++failures;
+      const Eigen::Vector2d pixel((camera.width - 1.0) * i / kSteps, (camera.height - 1.0) * j / kSteps);
+      const Eigen::Vector2d back = camera.distort(camera.undistort(pixel));
+      if (!((back - pixel).norm() < kTolerance)) ++failures;
     }
   }
   return failures <= kFewPoints;
@@ -43,14 +43,14 @@ void Camera::validate() const {
   require(positive(fx), "fx must be positive, got " + std::to_string(fx) + got);
   require(positive(fy), "fy must be positive, got " + std::to_string(fy) + got);
   require(fx / fy > 0.1 && fx / fy < 10.0, "fx and fy differ more than tenfold" + got);
-  require(fx > 0.05 * width && fx < 100.0 * width, "fx is absurd for the image width" + got);
+  require(fx > 0.05 * width && fx < 100.0 * width, "fx is implausible for the image width" + got);
   require(std::isfinite(cx) && cx > -width && cx < 2 * width, "cx lies far outside the image" + got);
   require(std::isfinite(cy) && cy > -height && cy < 2 * height, "cy lies far outside the image" + got);
   for (const double k : distortion) {
     require(std::isfinite(k) && std::abs(k) < 1000.0,
             "distortion must be five finite numbers k1 k2 p1 p2 k3" + got);
   }
-  require(is_invertible(*this), "distortion bends the image so much that it cannot be undone" + got);
+  require(is_invertible(*this), "distortion cannot be inverted over the image" + got);
   require(positive(depth_units_per_metre),
           "depth_units_per_metre must be positive (5000 for TUM, 1000 for millimetres), got " +
               std::to_string(depth_units_per_metre));

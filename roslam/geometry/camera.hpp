@@ -9,11 +9,13 @@
 #include <string_view>
 #include <vector>
 
+#include "roslam/common/export.hpp"
+
 namespace roslam {
 
 /// A pinhole camera with Brown-Conrady lens distortion. Pixels: x right, y down, the centre of the top left
 /// pixel at (0, 0). Camera frame: z forward, x right, y down, metres.
-struct Camera {
+struct ROSLAM_EXPORT Camera {
   int width = 640;                                  ///< pixels
   int height = 480;                                 ///< pixels
   double fx = 525.0;                                ///< pixels
@@ -24,7 +26,7 @@ struct Camera {
   double depth_units_per_metre = 5000.0;            ///< value of a 16-bit depth image at one metre
   double fps = 30.0;                                ///< frames a second
 
-  /// Throws CalibrationError naming the field that no real camera can have.
+  /// Throws CalibrationError naming the field that is out of range.
   void validate() const;
 
   bool has_distortion() const;
@@ -39,32 +41,32 @@ struct Camera {
     return {(pixel.x() - cx) / fx * z, (pixel.y() - cy) / fy * z, z};
   }
 
-  /// Where an undistorted pixel lies in the image as taken.
+  /// Maps an undistorted pixel to the raw (distorted) image.
   Eigen::Vector2d distort(const Eigen::Vector2d& pixel) const;
 
-  /// Where a pixel of the image as taken would lie without lens distortion (inverse of distort).
+  /// Removes lens distortion from a pixel of the raw image (inverse of distort; Newton iteration).
   Eigen::Vector2d undistort(const Eigen::Vector2d& pixel) const;
 
-  /// The box that holds every undistorted pixel of the image: {min_x, min_y, max_x, max_y}.
+  /// Bounding box of all undistorted pixels of the image: {min_x, min_y, max_x, max_y}.
   std::array<double, 4> undistorted_bounds() const;
 
   bool operator==(const Camera&) const = default;
 };
 
 /// The names load_camera knows: tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated.
-std::vector<std::string> camera_preset_names();
+ROSLAM_EXPORT std::vector<std::string> camera_preset_names();
 
 /// The preset of that name, or nothing.
-std::optional<Camera> camera_preset(std::string_view name);
+ROSLAM_EXPORT std::optional<Camera> camera_preset(std::string_view name);
 
 /// Reads a camera file (YAML: model, width, height, fx, fy, cx, cy, distortion, depth_units_per_metre, fps).
-/// Throws InputError for a missing or malformed file or an unknown key, CalibrationError for absurd values.
-Camera read_camera(const std::filesystem::path& file);
+/// Throws InputError for a missing or malformed file or an unknown key, CalibrationError as validate does.
+ROSLAM_EXPORT Camera read_camera(const std::filesystem::path& file);
 
 /// A preset name or a camera file. Throws as read_camera does.
-Camera load_camera(const std::string& preset_or_file);
+ROSLAM_EXPORT Camera load_camera(const std::string& preset_or_file);
 
 /// Writes what read_camera reads.
-std::string camera_to_yaml(const Camera& camera);
+ROSLAM_EXPORT std::string camera_to_yaml(const Camera& camera);
 
 }  // namespace roslam

@@ -2,9 +2,9 @@
 #include <map>
 #include <set>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/yaml_file.hpp"
 #include "roslam/geometry/camera.hpp"
-#include "roslam/geometry/yaml_file.hpp"
 
 namespace roslam {
 
@@ -63,7 +63,7 @@ void reject_unknown_keys(const std::filesystem::path& path, const YAML::Node& no
     if (!entry.first.IsScalar())
       throw InputError(path.string() + ": a key must be a word; write 'key: value' lines");
     const std::string& key = entry.first.Scalar();
-    // YAML readers take one of two equal keys without a word.
+    // YAML parsers silently take one of two equal keys.
     if (!seen.insert(key).second)
       throw InputError(path.string() + ": '" + key + "' is given twice; remove one");
     if (!known.contains(key)) {

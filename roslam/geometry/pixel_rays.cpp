@@ -6,7 +6,7 @@
 namespace roslam {
 
 namespace {
-constexpr double kDistortionTolerance = 0.5;  // pixels by which undoing distortion may miss
+constexpr double kDistortionTolerance = 0.5;  // pixels, error allowed when removing distortion
 constexpr float kNearest = 0.05F;             // metres
 }  // namespace
 
@@ -35,7 +35,7 @@ PixelRays::PixelRays(const Camera& camera)
 std::optional<Eigen::Vector2f> PixelRays::pixel(const Eigen::Vector3f& point) const {
   if (!(point.z() > kNearest)) return std::nullopt;
   const Eigen::Vector2f ray = point.head<2>() / point.z();
-  // Far outside of the image the model of distortion may lead back into it.
+  // Far outside the image the distortion model may map points back into it.
   if (!(ray.x() >= low_.x() && ray.y() >= low_.y() && ray.x() <= high_.x() && ray.y() <= high_.y()))
     return std::nullopt;
   const auto fx = static_cast<float>(camera_.fx), fy = static_cast<float>(camera_.fy);

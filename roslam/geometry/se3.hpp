@@ -4,23 +4,25 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "roslam/common/export.hpp"
+
 namespace roslam {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// The matrix [v]x with [v]x w = v x w.
-Eigen::Matrix3d skew(const Eigen::Vector3d& v);
+ROSLAM_EXPORT Eigen::Matrix3d skew(const Eigen::Vector3d& v);
 
 /// Rotation vector (radians) to unit quaternion, and back (angle in [0, pi]).
-Eigen::Quaterniond so3_exp(const Eigen::Vector3d& omega);
-Eigen::Vector3d so3_log(const Eigen::Quaterniond& q);
+ROSLAM_EXPORT Eigen::Quaterniond so3_exp(const Eigen::Vector3d& omega);
+ROSLAM_EXPORT Eigen::Vector3d so3_log(const Eigen::Quaterniond& q);
 
 /// Left Jacobian J of SO(3): exp(omega + d) = exp(J d) exp(omega) to first order (Barfoot 2017, eq. 7.77).
-Eigen::Matrix3d so3_left_jacobian(const Eigen::Vector3d& omega);
+ROSLAM_EXPORT Eigen::Matrix3d so3_left_jacobian(const Eigen::Vector3d& omega);
 
-/// A rigid motion. A variable named T_a_b maps coordinates in frame b to coordinates in frame a.
-class SE3 {
+/// A rigid transform. A variable named T_a_b maps coordinates in frame b to coordinates in frame a.
+class ROSLAM_EXPORT SE3 {
  public:
   SE3() : rotation_(Eigen::Quaterniond::Identity()), translation_(Eigen::Vector3d::Zero()) {}
   SE3(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation)
@@ -28,7 +30,7 @@ class SE3 {
   SE3(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation)
       : SE3(Eigen::Quaterniond(rotation), translation) {}
 
-  /// A motion from parts that came from one, bit by bit: the quaternion must be of unit length already.
+  /// Restores a transform exactly from its parts, without normalising: the quaternion must be of unit length.
   static SE3 from_parts(const Eigen::Quaterniond& unit, const Eigen::Vector3d& translation) {
     SE3 result;
     result.rotation_ = unit;
@@ -36,7 +38,7 @@ class SE3 {
     return result;
   }
 
-  /// Tangent (translation part first, then rotation vector) to motion, and back.
+  /// Exponential map and its inverse. Tangent: translation part first, then rotation vector (radians).
   static SE3 exp(const Vector6d& tangent);
   Vector6d log() const;
 

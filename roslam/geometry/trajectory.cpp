@@ -13,8 +13,8 @@
 #include <string>
 #include <string_view>
 
-#include "roslam/error.hpp"
-#include "roslam/write_file.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/write_file.hpp"
 
 namespace roslam {
 
@@ -41,7 +41,7 @@ std::optional<double> parse_number(std::string_view word) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (end != word.data() + word.size()) return std::nullopt;
-  // A number too large for a double is a number still: the pose is unusable, the line is not malformed.
+  // A number out of range is still a number: the pose is unusable, but the line is not malformed.
   if (error == std::errc::result_out_of_range) return std::numeric_limits<double>::quiet_NaN();
   return error == std::errc() ? std::make_optional(value) : std::nullopt;
 }
@@ -70,7 +70,7 @@ std::optional<StampedPose> to_pose(const Row& row) {
 
 void sort_and_drop_repeats(TrajectoryFile& file) {
   auto& poses = file.trajectory;
-  // Stable, so that of several poses with one time it is always the first in the file that stays.
+  // Stable, so that of several poses with equal time the first in the file is kept.
   std::stable_sort(poses.begin(), poses.end(),
                    [](const StampedPose& a, const StampedPose& b) { return a.timestamp < b.timestamp; });
   const auto end = std::unique(poses.begin(), poses.end(), [](const StampedPose& a, const StampedPose& b) {
@@ -85,12 +85,12 @@ void append_number(std::string& text, double value, int decimals) {
   const auto result =
       std::to_chars(digits.data(), digits.data() + digits.size(), value, std::chars_format::fixed, decimals);
   std::string_view word(digits.data(), static_cast<std::size_t>(result.ptr - digits.data()));
-  // A minus sign before nothing but zeros depends on rounding noise; the same pose shall give the same bytes.
+  // No "-0.000": its sign depends on rounding noise, and equal poses must give equal bytes.
   if (word.front() == '-' && word.find_first_not_of("-0.") == std::string_view::npos) word.remove_prefix(1);
   text += word;
 }
 
-// q and -q are one rotation: the one with w >= 0 is written.
+// q and -q are the same rotation: the one with w >= 0 is written.
 Eigen::Vector4d canonical_coefficients(const Eigen::Quaterniond& q) {
   Eigen::Vector4d xyzw = q.coeffs();
   for (const int i : {3, 0, 1, 2}) {

@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "roslam/common/export.hpp"
+
 namespace roslam {
 
-/// A number that names an element of a map; ids are given out in order and never reused.
+/// Identifies an element of a map; ids are assigned in ascending order and never reused.
 template <typename Tag>
-struct Id {
+struct ROSLAM_EXPORT Id {
   static constexpr std::uint32_t kNone = 0xffffffffU;
   std::uint32_t value = kNone;
 
@@ -21,7 +23,7 @@ struct Id {
 using KeyframeId = Id<struct KeyframeTag>;
 using LandmarkId = Id<struct LandmarkTag>;
 
-/// A part of a map that is tied to no other: where the parts lie to each other is not known (yet).
-using WorldId = Id<struct WorldTag>;
+/// A connected component of a map. The relative pose of different submaps is unknown.
+using SubmapId = Id<struct SubmapTag>;
 
 }  // namespace roslam

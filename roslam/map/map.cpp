@@ -4,25 +4,28 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <string>
+
+#include "roslam/common/error.hpp"
 
 namespace roslam {
 
 namespace {
-// A landmark is still recognised a little nearer and farther than the pyramid alone would allow.
+// A landmark is still recognised slightly nearer and farther than the pyramid levels alone would allow.
 constexpr float kNearTolerance = 0.8F;
 constexpr float kFarTolerance = 1.2F;
 }  // namespace
 
 KeyframeId Map::add_keyframe(std::size_t frame_index, double timestamp, const SE3& T_camera_world,
-                             std::shared_ptr<const ObservedFrame> view, WorldId world) {
-  return insert(Keyframe{{}, frame_index, timestamp, T_camera_world, std::move(view), {}, world, flight_});
+                             std::shared_ptr<const ObservedFrame> view, SubmapId submap) {
+  return insert(Keyframe{{}, frame_index, timestamp, T_camera_world, std::move(view), {}, submap, session_});
 }
 
 KeyframeId Map::insert(Keyframe keyframe) {
   keyframe.id = KeyframeId{static_cast<std::uint32_t>(keyframes_.size())};
   keyframe.landmarks.assign(keyframe.view->size(), {});
-  newest_world_ = std::max(newest_world_, keyframe.world.value);
-  flight_ = std::max(flight_, keyframe.flight);
+  newest_submap_ = std::max(newest_submap_, keyframe.submap.value);
+  session_ = std::max(session_, keyframe.session);
   keyframes_.push_back(std::make_unique<Keyframe>(std::move(keyframe)));
   anchors_.emplace_back();
   ++keyframe_count_;
@@ -39,22 +42,22 @@ LandmarkId Map::insert(Landmark landmark) {
 }
 
 void Map::append(const Map& other) {
-  // Numbers of worlds and flights without gaps, too.
-  std::map<WorldId, WorldId> world_of;
-  std::map<std::uint32_t, std::uint32_t> flight_of;
+  // Submaps and sessions are renumbered without gaps, too.
+  std::map<SubmapId, SubmapId> submap_of;
+  std::map<std::uint32_t, std::uint32_t> session_of;
   for (const KeyframeId id : other.keyframe_ids()) {
-    world_of[other.find(id)->world];
-    flight_of[other.find(id)->flight];
+    submap_of[other.find(id)->submap];
+    session_of[other.find(id)->session];
   }
-  std::uint32_t next_world = keyframe_count_ > 0 ? newest_world_ + 1 : 0;
-  std::uint32_t next_flight = keyframe_count_ > 0 ? flight_ + 1 : 0;
-  for (auto& [theirs, ours] : world_of) ours = WorldId{next_world++};
-  for (auto& [theirs, ours] : flight_of) ours = next_flight++;
+  std::uint32_t next_submap = keyframe_count_ > 0 ? newest_submap_ + 1 : 0;
+  std::uint32_t next_session = keyframe_count_ > 0 ? session_ + 1 : 0;
+  for (auto& [theirs, ours] : submap_of) ours = SubmapId{next_submap++};
+  for (auto& [theirs, ours] : session_of) ours = next_session++;
   std::vector<KeyframeId> id_of(other.keyframe_slots());
   for (const KeyframeId id : other.keyframe_ids()) {
     Keyframe keyframe = *other.find(id);
-    keyframe.world = world_of.at(keyframe.world);
-    keyframe.flight = flight_of.at(keyframe.flight);
+    keyframe.submap = submap_of.at(keyframe.submap);
+    keyframe.session = session_of.at(keyframe.session);
     id_of[id.index()] = insert(std::move(keyframe));
   }
   for (const LandmarkId id : other.landmark_ids()) {
@@ -68,24 +71,24 @@ void Map::append(const Map& other) {
     add_loop(id_of[loop.from.index()], id_of[loop.to.index()], loop.T_to_from);
 }
 
-std::vector<WorldId> Map::worlds() const {
-  std::set<WorldId> result;
+std::vector<SubmapId> Map::submaps() const {
+  std::set<SubmapId> result;
   for (const auto& keyframe : keyframes_) {
-    if (keyframe) result.insert(keyframe->world);
+    if (keyframe) result.insert(keyframe->submap);
   }
   return {result.begin(), result.end()};
 }
 
-void Map::join_worlds(WorldId from, WorldId into) {
+void Map::merge_submaps(SubmapId from, SubmapId into) {
   for (const auto& keyframe : keyframes_) {
-    if (keyframe && keyframe->world == from) keyframe->world = into;
+    if (keyframe && keyframe->submap == from) keyframe->submap = into;
   }
 }
 
-Trajectory Map::trajectory(std::uint32_t flight, WorldId world) const {
+Trajectory Map::trajectory(std::uint32_t session, SubmapId submap) const {
   Trajectory result;
   for (const auto& keyframe : keyframes_) {
-    if (!keyframe || keyframe->flight != flight || keyframe->world != world) continue;
+    if (!keyframe || keyframe->session != session || keyframe->submap != submap) continue;
     result.push_back({keyframe->timestamp, keyframe->T_camera_world.inverse()});
   }
   return result;
@@ -93,9 +96,9 @@ Trajectory Map::trajectory(std::uint32_t flight, WorldId world) const {
 
 std::set<KeyframeId> Map::origins() const {
   std::set<KeyframeId> result;
-  std::set<WorldId> held;
+  std::set<SubmapId> found;
   for (const auto& keyframe : keyframes_) {
-    if (keyframe && held.insert(keyframe->world).second) result.insert(keyframe->id);
+    if (keyframe && found.insert(keyframe->submap).second) result.insert(keyframe->id);
   }
   return result;
 }
@@ -106,8 +109,8 @@ LandmarkId Map::add_landmark(const Eigen::Vector3d& position, KeyframeId keyfram
   landmark->id = id;
   landmark->position = position;
   landmark->created_by = keyframe;
-  landmark->predicted = 1;
-  landmark->found = 1;
+  landmark->times_visible = 1;
+  landmark->times_found = 1;
   landmark->colour = find(keyframe)->view->colours[point];
   landmarks_.push_back(std::move(landmark));
   merged_into_.emplace_back();
@@ -154,9 +157,9 @@ void Map::remove_landmark(LandmarkId id) {
 
 void Map::remove_keyframe(KeyframeId id, KeyframeId anchor) {
   Keyframe* keyframe = find(id);
-  const Keyframe* holder = find(anchor);
-  if (keyframe == nullptr || holder == nullptr) return;
-  anchors_[id.index()] = {anchor, keyframe->T_camera_world * holder->T_camera_world.inverse()};
+  const Keyframe* anchor_keyframe = find(anchor);
+  if (keyframe == nullptr || anchor_keyframe == nullptr || id == anchor) return;
+  anchors_[id.index()] = {anchor, keyframe->T_camera_world * anchor_keyframe->T_camera_world.inverse()};
   const std::vector<LandmarkId> seen = keyframe->landmarks;
   for (const LandmarkId landmark : seen) {
     if (landmark.is_valid()) remove_observation(landmark, id);
@@ -170,8 +173,8 @@ void Map::merge_landmarks(LandmarkId from, LandmarkId into) {
   Landmark* target = find(into);
   if (source == nullptr || target == nullptr || from == into) return;
   const std::vector<Observation> observations = source->observations;
-  target->found += source->found;
-  target->predicted += source->predicted;
+  target->times_found += source->times_found;
+  target->times_visible += source->times_visible;
   remove_landmark(from);
   merged_into_[from.index()] = into;
   for (const auto& observation : observations) add_observation(into, observation.keyframe, observation.point);
@@ -195,11 +198,16 @@ const Landmark* Map::find(LandmarkId id) const {
 }
 
 LandmarkId Map::resolve(LandmarkId id) const {
-  while (id.is_valid() && merged_into_[id.index()].is_valid()) id = merged_into_[id.index()];
+  while (id.index() < merged_into_.size() && merged_into_[id.index()].is_valid())
+    id = merged_into_[id.index()];
   return id;
 }
 
 std::pair<KeyframeId, SE3> Map::T_camera_anchor(KeyframeId id) const {
+  if (id.index() >= keyframes_.size())
+    throw UsageError("map: " + (id.is_valid()
+                                    ? "there never was a keyframe " + std::to_string(id.value)
+                                    : std::string("an invalid keyframe id has no pose and no submap")));
   SE3 T_camera_anchor;
   while (find(id) == nullptr) {
     T_camera_anchor = T_camera_anchor * anchors_[id.index()].T_camera_anchor;
@@ -243,7 +251,7 @@ void Map::refresh_geometry(LandmarkId id) {
     landmark->normal += (T_world_camera.translation() - landmark->position).normalized();
   }
   landmark->normal.normalize();
-  // The first observation tells at which distance the patch has the size of its level.
+  // The first observation gives the distance at which the patch has the size of its level.
   const auto& first = landmark->observations.front();
   const Keyframe& keyframe = *find(first.keyframe);
   const double distance = (keyframe.T_camera_world * landmark->position).norm();

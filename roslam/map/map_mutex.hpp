@@ -5,8 +5,8 @@
 
 namespace roslam {
 
-/// Guards a map that several threads share. Who waits comes before who has just let go of it, so that a
-/// thread that takes it again and again for short work does not keep the others waiting for all of it.
+/// Mutex of a map shared between threads. A waiting thread is served before the one that has just unlocked,
+/// so that a thread that locks repeatedly for short work does not starve the others.
 class MapMutex {
  public:
   void lock() {
@@ -16,7 +16,7 @@ class MapMutex {
   void unlock() { map_.unlock(); }
 
  private:
-  std::mutex next_;  // held by the one who waits for the map
+  std::mutex next_;  // held by the thread that is next to lock map_
   std::mutex map_;
 };
 

@@ -5,15 +5,15 @@
 #include <cstring>
 #include <sstream>
 
-#include "roslam/write_file.hpp"
+#include "roslam/common/write_file.hpp"
 
 namespace roslam {
 
-void write_map_ply(const std::filesystem::path& file, const Map& map, WorldId world) {
+void write_map_ply(const std::filesystem::path& file, const Map& map, SubmapId submap) {
   static_assert(std::endian::native == std::endian::little, "the PLY header promises little-endian values");
   std::ostringstream out;
   auto ids = map.landmark_ids();
-  std::erase_if(ids, [&](LandmarkId id) { return map.world_of(*map.find(id)) != world; });
+  std::erase_if(ids, [&](LandmarkId id) { return map.submap_of(*map.find(id)) != submap; });
   out << "ply\nformat binary_little_endian 1.0\ncomment RO-SLAM sparse map, world frame, metres\n"
       << "element vertex " << ids.size() << "\n"
       << "property float x\nproperty float y\nproperty float z\n"

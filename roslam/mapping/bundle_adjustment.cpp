@@ -7,7 +7,7 @@
 #include <cmath>
 #include <memory>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/mapping/bundle_cost.hpp"
 #include "roslam/mapping/stop_callback.hpp"
 

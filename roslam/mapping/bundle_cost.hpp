@@ -5,14 +5,14 @@
 
 #include <Eigen/Geometry>
 
-#include "roslam/geometry/reprojection.hpp"
+#include "roslam/estimation/measurement_model.hpp"
 #include "roslam/geometry/se3.hpp"
 
 namespace roslam {
 
 /// The error of one measurement as a function of a pose and a point. The pose has six parameters: the
-/// translation of T_camera_world, and a rotation vector omega applied on top of the rotation the problem
-/// started with, R = exp(omega) R_0, so that it stays small and free of singularities.
+/// translation of T_camera_world, and a rotation vector omega relative to the initial rotation,
+/// R = exp(omega) R_0, which stays small and thus away from singularities.
 template <int kRows>  // 3 with depth, 2 without
 class BundleCost : public ceres::SizedCostFunction<kRows, 6, 3> {
  public:
@@ -26,7 +26,7 @@ class BundleCost : public ceres::SizedCostFunction<kRows, 6, 3> {
     const Eigen::Matrix3d rotation = (so3_exp(omega) * initial_rotation_).toRotationMatrix();
     const Eigen::Vector3d rotated = rotation * point;
     Eigen::Vector3d in_camera = rotated + translation;
-    // A point that strays behind the camera keeps a large but finite error.
+    // A point behind the camera keeps a large but finite error.
     if (in_camera.z() < kMinDepth) in_camera.z() = kMinDepth;
     const ReprojectionError term{camera_, measurement_};
     Eigen::Map<Eigen::Matrix<double, kRows, 1>> error(residuals);

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam {
 
@@ -33,10 +33,10 @@ bool is_redundant(const Map& map, const Keyframe& keyframe, const CullingOptions
   return well_seen > options.redundant_share * landmarks;
 }
 
-// True if a frame shows something that moves at a landmark's place, or a surface behind it.
+// True if the landmark projects onto a moving object at its depth, or if the frame sees through it.
 bool is_contradicted(const Eigen::Vector3d& point, const Eigen::Vector2d& pixel, const Contradiction& frame,
                      const MeasurementNoise& noise) {
-  constexpr int kAround = 2;  // pixels: at the edges of things nothing is sure
+  constexpr int kAround = 2;  // pixels: depth is unreliable at object borders
   if (!pixel.allFinite()) return false;
   const cv::Point centre(cvRound(pixel.x()), cvRound(pixel.y()));
   if (centre.x < kAround || centre.y < kAround || centre.x + kAround >= frame.depth.cols ||
@@ -44,14 +44,14 @@ bool is_contradicted(const Eigen::Vector3d& point, const Eigen::Vector2d& pixel,
     return false;
   }
   const double tolerance = 3.0 * noise.sigma_of_depth(point.z()) + 0.02 * point.z();
-  bool is_through = true;
+  bool sees_through = true;
   for (int y = centre.y - kAround; y <= centre.y + kAround; ++y) {
     for (int x = centre.x - kAround; x <= centre.x + kAround; ++x) {
       const auto z = static_cast<double>(frame.depth.at<float>(y, x));
-      is_through = is_through && z > point.z() + 2.0 * tolerance;
+      sees_through = sees_through && z > point.z() + 2.0 * tolerance;
     }
   }
-  if (is_through) return true;
+  if (sees_through) return true;
   const auto z = static_cast<double>(frame.depth.at<float>(centre));
   return !frame.moving.empty() && frame.moving.at<std::uint8_t>(centre) != 0 && z > 0.0 &&
          std::abs(z - point.z()) < tolerance;
@@ -83,7 +83,8 @@ int LandmarkCuller::cull(Map& map, KeyframeId newest) {
     const auto age = static_cast<int>(newest.value - landmark->created_by.value);
     const auto views = static_cast<int>(landmark->observations.size());
     const int needed = age < options_.probation ? 2 : options_.min_observations;
-    if (landmark->found < options_.min_found_ratio * landmark->predicted || (age >= 2 && views < needed)) {
+    if (landmark->times_found < options_.min_found_ratio * landmark->times_visible ||
+        (age >= 2 && views < needed)) {
       map.remove_landmark(id);
       ++removed;
     } else if (age < options_.probation) {
@@ -107,7 +108,7 @@ int cull_contradicted(Map& map, const std::vector<LandmarkId>& landmarks, const 
     ++landmark->contradicted;
     constexpr std::uint32_t kOften = 3;  // frames
     constexpr double kShare = 0.25;      // of the frames that found it
-    if (landmark->contradicted >= kOften && landmark->contradicted > kShare * landmark->found) {
+    if (landmark->contradicted >= kOften && landmark->contradicted > kShare * landmark->times_found) {
       map.remove_landmark(id);
       ++removed;
     }

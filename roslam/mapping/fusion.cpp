@@ -3,13 +3,13 @@
 
 #include <algorithm>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/mapping/landmark_fit.hpp"
 
 namespace roslam {
 
 namespace {
-// The keyframe's neighbours and theirs, each once.
+// The covisible keyframes and theirs, each once.
 std::vector<KeyframeId> neighbourhood(const Map& map, KeyframeId id, const FusionOptions& options) {
   std::vector<KeyframeId> result;
   const auto add = [&](KeyframeId candidate) {
@@ -58,10 +58,12 @@ class Fuser {
       const int match = matcher_.find({predicted->pixel, radius, predicted->level - 1, predicted->level,
                                        predicted->depth, matcher_.options().strict_distance, false},
                                       landmark->descriptor, view, none_taken);
-      if (match < 0 ||
-          !fits(map_, keyframe, static_cast<std::uint32_t>(match), landmark->position, camera_, noise_))
+      if (match < 0) continue;
+      const auto point = static_cast<std::uint32_t>(match);
+      if (view.may_move(point) ||
+          !is_within_outlier_limit(map_, keyframe, point, landmark->position, camera_, noise_))
         continue;
-      merged += join(id, keyframe_id, static_cast<std::uint32_t>(match)) ? 1 : 0;
+      merged += add_or_merge(id, keyframe_id, point) ? 1 : 0;
     }
     return merged;
   }
@@ -72,8 +74,8 @@ class Fuser {
                        [&](const Observation& o) { return o.keyframe == keyframe; });
   }
 
-  // True if two landmarks became one.
-  bool join(LandmarkId id, KeyframeId keyframe_id, std::uint32_t point) {
+  // True if two landmarks were merged.
+  bool add_or_merge(LandmarkId id, KeyframeId keyframe_id, std::uint32_t point) {
     const LandmarkId other = map_.find(keyframe_id)->landmarks[point];
     if (!other.is_valid()) {
       map_.add_observation(id, keyframe_id, point);

@@ -3,8 +3,9 @@
 
 namespace roslam {
 
-bool fits(const Map& map, const Keyframe& keyframe, std::uint32_t point, const Eigen::Vector3d& position,
-          const Camera& camera, const MeasurementNoise& noise) {
+bool is_within_outlier_limit(const Map& map, const Keyframe& keyframe, std::uint32_t point,
+                             const Eigen::Vector3d& position, const Camera& camera,
+                             const MeasurementNoise& noise) {
   const Eigen::Vector3d in_camera = keyframe.T_camera_world * position;
   if (in_camera.z() <= 0.0) return false;
   const Measurement measurement = map.measurement(*keyframe.view, point, noise);

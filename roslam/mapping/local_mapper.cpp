@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/mapping/local_mapper.hpp"
 
-#include "roslam/geometry/stopwatch.hpp"
+#include "roslam/common/stopwatch.hpp"
 
 namespace roslam {
 
@@ -19,7 +19,7 @@ LocalMapper::LocalMapper(const Camera& camera, Map& map, MapMutex& map_mutex, co
 
 KeyframeId LocalMapper::insert(const TrackedFrame& frame, std::size_t frame_index) {
   const KeyframeId id =
-      map_.add_keyframe(frame_index, frame.timestamp, *frame.T_camera_world, frame.view, world_of(frame));
+      map_.add_keyframe(frame_index, frame.timestamp, *frame.T_camera_world, frame.view, submap_of(frame));
   for (std::uint32_t i = 0; i < frame.landmarks.size(); ++i) {
     if (!frame.landmarks[i].is_valid() || frame.view->may_move(i)) continue;
     if (map_.add_observation(frame.landmarks[i], id, i)) map_.refresh(frame.landmarks[i]);
@@ -28,11 +28,11 @@ KeyframeId LocalMapper::insert(const TrackedFrame& frame, std::size_t frame_inde
   return id;
 }
 
-// A frame that refers to no keyframe is the first of its world.
-WorldId LocalMapper::world_of(const TrackedFrame& frame) {
-  if (map_.keyframe_count() == 0) return WorldId{0};
-  if (!frame.reference.is_valid()) return map_.new_world();
-  return map_.world_of(frame.reference);
+// A frame without a reference keyframe is the first of a new submap.
+SubmapId LocalMapper::submap_of(const TrackedFrame& frame) {
+  if (map_.keyframe_count() == 0) return SubmapId{0};
+  if (!frame.reference.is_valid()) return map_.new_submap();
+  return map_.submap_of(frame.reference);
 }
 
 void LocalMapper::process(KeyframeId keyframe, const std::function<bool()>& should_stop) {
@@ -77,7 +77,7 @@ void LocalMapper::adjust_around(KeyframeId keyframe, const std::function<bool()>
   const BundleSummary summary = adjust_bundle(camera_, local.problem, settings_.bundle, should_stop);
   if (!summary.is_usable) return;
   const std::scoped_lock lock(map_mutex_);
-  if (map_.corrections() != corrections) return;  // a loop moved the map meanwhile
+  if (map_.corrections() != corrections) return;  // a loop closure moved the map meanwhile
   local.apply_to(map_, camera_);
 }
 
@@ -97,11 +97,11 @@ LocalBundle LocalBundle::around(const Map& map, KeyframeId keyframe, const Measu
     add_pose(id, origins.count(id) > 0);
   }
   std::vector<bool> is_in(map.landmark_slots(), false);
-  const std::vector<KeyframeId> moving = local.keyframes;
-  for (const KeyframeId id : moving) {
+  const std::vector<KeyframeId> window = local.keyframes;
+  for (const KeyframeId id : window) {
     for (const LandmarkId landmark : map.find(id)->landmarks) {
       if (!landmark.is_valid() || is_in[landmark.index()]) continue;
-      // Seen once only, a landmark says nothing about the pose.
+      // A landmark seen once does not constrain the pose.
       if (map.find(landmark)->observations.size() < 2) continue;
       is_in[landmark.index()] = true;
       local.landmarks.push_back(landmark);

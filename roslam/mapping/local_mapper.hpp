@@ -3,8 +3,8 @@
 
 #include <functional>
 
+#include "roslam/estimation/measurement_model.hpp"
 #include "roslam/geometry/camera.hpp"
-#include "roslam/geometry/reprojection.hpp"
 #include "roslam/map/map.hpp"
 #include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/bundle_adjustment.hpp"
@@ -15,7 +15,7 @@
 
 namespace roslam {
 
-/// Grows and refines the map, keyframe by keyframe.
+/// Local mapping: extends and refines the map, keyframe by keyframe.
 class LocalMapper {
  public:
   struct Settings {
@@ -30,12 +30,12 @@ class LocalMapper {
   /// map_mutex guards the map against the tracker while process() runs on another thread.
   LocalMapper(const Camera& camera, Map& map, MapMutex& map_mutex, const Settings& settings);
 
-  /// Makes a keyframe of a tracked frame, with landmarks for all points of known depth; of a new world if
-  /// the frame has no reference. Quick; the caller holds the mutex.
+  /// Creates a keyframe from a tracked frame, and landmarks from its points of known depth; in a new submap
+  /// if the frame has no reference. The caller holds the mutex.
   KeyframeId insert(const TrackedFrame& frame, std::size_t frame_index);
 
-  /// Culls, triangulates, fuses and adjusts around a keyframe. Slow; takes the mutex for the parts that touch
-  /// the map. should_stop ends bundle adjustment early, when the next keyframe waits.
+  /// Landmark culling, triangulation, fusion, local bundle adjustment and keyframe culling around a keyframe.
+  /// Slow; takes the mutex for the parts that touch the map. should_stop ends bundle adjustment early.
   void process(KeyframeId keyframe, const std::function<bool()>& should_stop = {});
 
   /// Seconds the last process() spent in each step, for the report.
@@ -48,7 +48,7 @@ class LocalMapper {
   const Times& times() const { return times_; }
 
  private:
-  WorldId world_of(const TrackedFrame& frame);
+  SubmapId submap_of(const TrackedFrame& frame);
   void adjust_around(KeyframeId keyframe, const std::function<bool()>& should_stop);
 
   Camera camera_;
@@ -59,19 +59,19 @@ class LocalMapper {
   Times times_;
 };
 
-/// The part of a map that local bundle adjustment moves, and what holds it in place.
+/// The part of a map that local bundle adjustment optimises, and the fixed poses that constrain it.
 struct LocalBundle {
   BundleProblem problem;
   std::vector<KeyframeId> keyframes;  ///< of each pose
   std::vector<LandmarkId> landmarks;  ///< of each point
 
-  /// The keyframe, the keyframes that share enough landmarks with it, all their landmarks, and as fixed poses
-  /// the other keyframes that see those. The first keyframe of a world is always fixed.
+  /// The keyframe, the keyframes that share enough landmarks with it, all landmarks of these that two or more
+  /// keyframes see, and as fixed poses the others that see them. The first keyframe of a submap is fixed.
   static LocalBundle around(const Map& map, KeyframeId keyframe, const MeasurementNoise& noise,
                             const BundleAdjustmentOptions& options);
 
-  /// Takes the result over into the map and removes the observations that do not fit it. What was removed
-  /// from the map meanwhile is left alone.
+  /// Writes the result to the map and removes outlier observations. Keyframes and landmarks that were removed
+  /// from the map meanwhile are skipped. The caller holds the mutex.
   void apply_to(Map& map, const Camera& camera) const;
 };
 

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/mapping/landmark_fit.hpp"
 
 namespace roslam {
 
 namespace {
-// Points of a keyframe that show no landmark and may show one: nothing that can move becomes part of the map.
+// Points of a keyframe without a landmark, except on movable objects, which are not mapped.
 std::vector<std::uint32_t> free_points(const Keyframe& keyframe) {
   std::vector<std::uint32_t> result;
   for (std::uint32_t i = 0; i < keyframe.landmarks.size(); ++i) {
@@ -50,15 +50,15 @@ std::vector<LandmarkId> landmarks_from_depth(Map& map, KeyframeId id, const Came
                                              const NewLandmarkOptions& options) {
   const Keyframe& keyframe = *map.find(id);
   const SE3 T_world_camera = keyframe.T_camera_world.inverse();
-  std::vector<LandmarkId> made;
+  std::vector<LandmarkId> created;
   for (const std::uint32_t i : free_points(keyframe)) {
     const double depth = keyframe.view->depths[i];
     if (depth <= 0.0 || noise.sigma_of_depth(depth) > options.max_relative_depth_sigma * depth) continue;
     const Eigen::Vector3d position =
         T_world_camera * camera.unproject(keyframe.view->pixels[i].cast<double>(), depth);
-    made.push_back(map.add_landmark(position, id, i));
+    created.push_back(map.add_landmark(position, id, i));
   }
-  return made;
+  return created;
 }
 
 std::optional<Eigen::Vector3d> triangulate(const Eigen::Vector3d& origin_a,
@@ -80,7 +80,7 @@ std::vector<LandmarkId> landmarks_from_triangulation(Map& map, KeyframeId id, co
                                                      const MeasurementNoise& noise,
                                                      const MatcherOptions& matcher,
                                                      const NewLandmarkOptions& options) {
-  std::vector<LandmarkId> made;
+  std::vector<LandmarkId> created;
   const Keyframe& keyframe = *map.find(id);
   int searched = 0;
   for (const auto& [neighbour_id, shared] : map.covisible(id, options.min_shared)) {
@@ -91,18 +91,18 @@ std::vector<LandmarkId> landmarks_from_triangulation(Map& map, KeyframeId id, co
     for (const auto& [ours, theirs] : match_descriptors(*keyframe.view, free, *neighbour.view, matcher)) {
       const auto position =
           triangulate_points(keyframe, ours, neighbour, theirs, camera, options.min_parallax);
-      if (!position || neighbour.landmarks[theirs].is_valid()) continue;
-      if (!fits(map, keyframe, ours, *position, camera, noise) ||
-          !fits(map, neighbour, theirs, *position, camera, noise)) {
+      if (!position || neighbour.landmarks[theirs].is_valid() || neighbour.view->may_move(theirs)) continue;
+      if (!is_within_outlier_limit(map, keyframe, ours, *position, camera, noise) ||
+          !is_within_outlier_limit(map, neighbour, theirs, *position, camera, noise)) {
         continue;
       }
       const LandmarkId landmark = map.add_landmark(*position, id, ours);
       map.add_observation(landmark, neighbour_id, theirs);
       map.refresh(landmark);
-      made.push_back(landmark);
+      created.push_back(landmark);
     }
   }
-  return made;
+  return created;
 }
 
 }  // namespace roslam

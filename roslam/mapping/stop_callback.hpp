@@ -7,8 +7,8 @@
 
 namespace roslam {
 
-/// Ends a solver with what it has so far once it is told to; asked after each step. The function must outlive
-/// the callback.
+/// Stops a Ceres solver with its current solution once should_stop returns true; it is asked after each step.
+/// The function must outlive the callback.
 class StopCallback : public ceres::IterationCallback {
  public:
   explicit StopCallback(const std::function<bool()>& should_stop) : should_stop_(should_stop) {}

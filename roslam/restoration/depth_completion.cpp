@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "roslam/error.hpp"
-#include "roslam/geometry/upper_median.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/upper_median.hpp"
 
 namespace roslam {
 
@@ -29,12 +29,12 @@ void DepthCompletionOptions::validate() const {
 
 namespace {
 constexpr int kDirections = 16;
-constexpr int kTrials = 80;          // of three cells, for each plane
+constexpr int kTrials = 80;          // RANSAC samples of three cells, for each plane
 constexpr int kNeighbourhood = 12;   // cells within which the three lie
 constexpr int kMinCells = 8;         // of a plane
-constexpr int kUnknownSurface = -1;  // what is met has no depth
+constexpr int kUnknownSurface = -1;  // without depth
 
-// Inverse depth at (x, y, 1), cells or pixels alike.
+// Coefficients (a, b, c) of the inverse depth a x + b y + c at pixel (x, y).
 using Plane = Eigen::Vector3d;
 
 double inverse_depth(const Plane& plane, double x, double y) {
@@ -46,7 +46,7 @@ struct Cell {
   double inverse;
 };
 
-// What is known in cells: CV_32FC1 inverse depth, 0 = unknown, and CV_8UC1, nonzero where a cell is mostly
+// The image in cells: CV_32FC1 median inverse depth, 0 = unknown, and CV_8UC1, nonzero where a cell is mostly
 // hole.
 struct Cells {
   cv::Mat inverse;
@@ -92,7 +92,7 @@ std::optional<Plane> fitted(const std::vector<Cell>& cells) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (const Cell& cell : cells) {
-    // Errors count relative to the depth.
+    // Relative residuals: weights by the inverse depth.
     const Eigen::Vector3d row = Eigen::Vector3d(cell.x, cell.y, 1.0) / cell.inverse;
     normal += row * row.transpose();
     right += row;
@@ -113,7 +113,7 @@ std::vector<Cell> cells_on(const std::vector<Cell>& cells, const Plane& plane, d
   return on;
 }
 
-// The plane that most of the cells lie on (RANSAC), if enough do.
+// The plane with the most inliers (RANSAC), refitted to them; nothing below kMinCells.
 std::optional<Plane> largest_plane(const std::vector<Cell>& cells, int side, double tolerance,
                                    cv::RNG& random) {
   std::optional<Plane> best;
@@ -160,18 +160,18 @@ class Surroundings {
     assign(box, options.plane_tolerance);
   }
 
-  // The surfaces that may show at a cell of the hole: those met in enough directions, and the one met most.
+  // The surfaces that may be visible in a cell of the hole: those hit often enough, and the one hit most.
   struct Candidates {
     std::vector<int> often;
     int most = kUnknownSurface;
   };
 
-  Candidates seen_from(const cv::Point& cell, double min_votes) const {
+  Candidates candidates_for(const cv::Point& cell, double min_votes) const {
     std::vector<double> votes(planes_.size() + 1, 0.0);  // the last: no depth
     double all = 0.0;
     for (int d = 0; d < kDirections; ++d) {
       const double angle = 2.0 * M_PI * d / kDirections;
-      const auto [surface, distance] = first_met(cell, {std::cos(angle), std::sin(angle)});
+      const auto [surface, distance] = first_hit(cell, {std::cos(angle), std::sin(angle)});
       if (distance == 0) continue;
       votes[surface == kUnknownSurface ? planes_.size() : static_cast<std::size_t>(surface)] +=
           1.0 / distance;
@@ -188,15 +188,16 @@ class Surroundings {
     return candidates;
   }
 
-  // Inverse depth at a pixel: of what is met often the nearest; 0 = none.
+  // Inverse depth at a pixel: of the surfaces hit often the nearest; 0 = none.
   double at(int x, int y, const Candidates& candidates) const {
     double nearest = 0.0;
-    for (const int surface : candidates.often) nearest = std::max(nearest, believable(surface, x, y));
-    return nearest > 0.0 || candidates.most == kUnknownSurface ? nearest : believable(candidates.most, x, y);
+    for (const int surface : candidates.often) nearest = std::max(nearest, plausible_inverse(surface, x, y));
+    return nearest > 0.0 || candidates.most == kUnknownSurface ? nearest
+                                                               : plausible_inverse(candidates.most, x, y);
   }
 
  private:
-  // What lies on no plane is a surface of its own, that faces the camera.
+  // A cell on no plane becomes a fronto-parallel surface of its own.
   void assign(const cv::Rect& box, double tolerance) {
     for (int y = box.y; y < box.br().y; ++y) {
       for (int x = box.x; x < box.br().x; ++x) {
@@ -213,21 +214,21 @@ class Surroundings {
     }
   }
 
-  double believable(int surface, int x, int y) const {
+  double plausible_inverse(int surface, int x, int y) const {
     const double inverse = inverse_depth(planes_[static_cast<std::size_t>(surface)], x, y);
     return inverse <= 1.5 * largest_ ? std::max(inverse, 0.0) : 0.0;
   }
 
-  struct Met {
+  struct Hit {
     int surface;
-    int distance;  // cells; 0 = nothing before the border of the picture
+    int distance;  // cells; 0 = none before the border of the image
   };
 
-  Met first_met(const cv::Point& cell, const cv::Point2d& direction) const {
-    const cv::Rect picture({0, 0}, surface_.size());
+  Hit first_hit(const cv::Point& cell, const cv::Point2d& direction) const {
+    const cv::Rect image({0, 0}, surface_.size());
     for (int step = 1;; ++step) {
       const cv::Point at(cvRound(cell.x + step * direction.x), cvRound(cell.y + step * direction.y));
-      if (!picture.contains(at)) return {kUnknownSurface, 0};
+      if (!image.contains(at)) return {kUnknownSurface, 0};
       if (cells_.is_hole.at<std::uint8_t>(at) == 0) return {surface_.at<int>(at), step};
     }
   }
@@ -235,13 +236,13 @@ class Surroundings {
   const Cells& cells_;
   cv::Mat surface_;  // CV_32SC1 of cells
   std::vector<Plane> planes_;
-  double largest_ = 0.0;  // inverse depth around
+  double largest_ = 0.0;  // inverse depth around the hole
 };
 
-cv::Rect around(const cv::Rect& box, int side, const cv::Size& picture) {
+cv::Rect around(const cv::Rect& box, int side, const cv::Size& image) {
   const int by = std::max(64, 3 * std::max(box.width, box.height) / 4);
   const cv::Rect wide(box.x - by, box.y - by, box.width + 2 * by, box.height + 2 * by);
-  const cv::Rect inside = wide & cv::Rect({0, 0}, picture);
+  const cv::Rect inside = wide & cv::Rect({0, 0}, image);
   const cv::Point first(inside.x / side, inside.y / side);
   const cv::Point last((inside.br().x - 1) / side + 1, (inside.br().y - 1) / side + 1);
   return {first, last};
@@ -260,7 +261,7 @@ cv::Mat completed_depth(const cv::Mat& depth, const cv::Mat& hole, const DepthCo
   CV_Assert(depth.type() == CV_32FC1 && hole.type() == CV_8UC1 && depth.size() == hole.size());
   cv::Mat result = cv::Mat::zeros(depth.size(), CV_32FC1);
   const Cells cells = cells_of(depth, hole, options);
-  // Holes next to each other have the same surroundings.
+  // Neighbouring holes share their surroundings.
   cv::Mat joined, parts;
   cv::dilate(hole, joined, cv::Mat(), {-1, -1}, 2 * options.cell);
   const int count = cv::connectedComponents(joined, parts);
@@ -270,7 +271,7 @@ cv::Mat completed_depth(const cv::Mat& depth, const cv::Mat& hole, const DepthCo
     const Surroundings surroundings(cells, around(box, options.cell, depth.size()), options);
     for_each_cell(box, options.cell, [&](const cv::Point& cell, const cv::Rect& pixels) {
       if (cv::countNonZero(of_part(pixels)) == 0) return;
-      const auto candidates = surroundings.seen_from(cell, options.min_votes);
+      const auto candidates = surroundings.candidates_for(cell, options.min_votes);
       for (int y = pixels.y; y < pixels.br().y; ++y) {
         for (int x = pixels.x; x < pixels.br().x; ++x) {
           if (of_part.at<std::uint8_t>(y, x) == 0) continue;

@@ -4,8 +4,8 @@
 #include <opencv2/dnn.hpp>
 #include <string>
 
-#include "roslam/error.hpp"
-#include "roslam/shipped_file.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/resources.hpp"
 
 namespace roslam {
 
@@ -18,8 +18,8 @@ cv::Mat channel(cv::Mat& blob, int number) {
   return {kCropSide, kCropSide, CV_32FC1, blob.ptr<float>(0, number)};
 }
 
-// RGB from 0 to 1, the hole and the square: 1 x 5 x 256 x 256.
-cv::Mat seen(const cv::Mat& crop, const cv::Mat& hole, const cv::Rect& square) {
+// 1 x 5 x 256 x 256: RGB from 0 to 1, the hole and the square.
+cv::Mat network_input(const cv::Mat& crop, const cv::Mat& hole, const cv::Rect& square) {
   const std::array sizes{1, 5, kCropSide, kCropSide};
   cv::Mat blob(static_cast<int>(sizes.size()), sizes.data(), CV_32FC1, cv::Scalar(0));
   for (int c = 0; c < 3; ++c) {
@@ -32,16 +32,16 @@ cv::Mat seen(const cv::Mat& crop, const cv::Mat& hole, const cv::Rect& square) {
   return blob;
 }
 
-cv::Mat picture_of(cv::Mat painted) {
+cv::Mat image_of(cv::Mat output) {
   std::array<cv::Mat, 3> channels;
   for (int c = 0; c < 3; ++c)
-    channel(painted, 2 - c).convertTo(channels[static_cast<std::size_t>(c)], CV_8U, 255.0);
-  cv::Mat picture;
-  cv::merge(channels, picture);
-  return picture;
+    channel(output, 2 - c).convertTo(channels[static_cast<std::size_t>(c)], CV_8U, 255.0);
+  cv::Mat image;
+  cv::merge(channels, image);
+  return image;
 }
 
-bool is_picture(const cv::Mat& blob) {
+bool is_image(const cv::Mat& blob) {
   return blob.dims == 4 && blob.size[0] == 1 && blob.size[1] == 3 && blob.size[2] == kCropSide &&
          blob.size[3] == kCropSide;
 }
@@ -54,23 +54,25 @@ GanInpainter::GanInpainter(const std::filesystem::path& folder, InferenceBackend
   }
 }
 
-cv::Mat GanInpainter::paint(const cv::Mat& crop, const cv::Mat& hole, const cv::Rect& square, Movable kind) {
+cv::Mat GanInpainter::inpaint(const cv::Mat& crop, const cv::Mat& hole, const cv::Rect& square,
+                              Movable kind) {
   CV_Assert(crop.type() == CV_8UC3 && crop.size() == cv::Size(kCropSide, kCropSide) &&
             hole.size() == crop.size());
   const Movable known = kind == Movable::kNone ? Movable::kUnknown : kind;
   const Network& network = networks_.at(static_cast<std::size_t>(known) - 1);
-  const cv::Mat painted = network.inference->run(seen(crop, hole, square));
-  if (!is_picture(painted)) {
-    throw ModelError(network.file.string() +
-                     ": gives no picture of 256x256 pixels; install the model that belongs to this version");
+  const cv::Mat output = network.inference->run(network_input(crop, hole, square));
+  if (!is_image(output)) {
+    throw ModelError(
+        network.file.string() +
+        ": its output is not an image of 256x256 pixels; install the model that belongs to this version");
   }
-  return picture_of(painted);
+  return image_of(output);
 }
 
-std::filesystem::path shipped_restoration_models() {
+std::filesystem::path find_restoration_models() {
   std::filesystem::path folder;
   for (const Movable kind : kKinds) {
-    const auto file = shipped_file(file_for(kind));
+    const auto file = find_resource(file_for(kind));
     if (file.empty()) return {};
     folder = file.parent_path();
   }

@@ -4,24 +4,24 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "roslam/removal/movable_object.hpp"
+#include "roslam/dynamic_objects/movable_object.hpp"
 
 namespace roslam {
 
-/// A region of the auxiliary descriptor (eqs. 12 and 18): what was removed and the (l, l) square around it.
+/// A region of the auxiliary descriptor (eqs. 12 and 18): class and (l, l) square of a removed object.
 struct RemovedRegion {
   Movable kind = Movable::kUnknown;
-  cv::Rect square;  ///< pixels; may reach beyond the picture
+  cv::Rect square;  ///< pixels; may reach beyond the image
 };
 
-/// The square of side l, the larger of height and width, with the centre of a box.
+/// The square of side l = max(height, width) concentric with a box.
 cv::Rect square_around(const cv::Rect& box);
 
-/// Regions of the things removed from a frame.
+/// Regions of the objects removed from a frame.
 std::vector<RemovedRegion> regions_of(const std::vector<MovableObject>& objects);
 
-/// What was removed at a box: the class of the region whose square covers most of it, of several that do the
-/// smallest; unknown if none covers a quarter.
+/// Class of the object removed at a box: that of the region whose square covers most of it (ties: the
+/// smallest square); kUnknown if none covers more than a quarter.
 Movable kind_of(const cv::Rect& box, const std::vector<RemovedRegion>& regions);
 
 }  // namespace roslam

@@ -5,8 +5,9 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "roslam/error.hpp"
-#include "roslam/restoration/seam.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/restoration/diffusion_inpainting.hpp"
+#include "roslam/restoration/seam_blending.hpp"
 
 namespace roslam {
 
@@ -19,32 +20,32 @@ const Camera& validated(const Camera& camera) {
 const StaticSceneRestorer::Settings& validated(const StaticSceneRestorer::Settings& settings) {
   settings.restoration.validate();
   settings.reprojection.validate();
-  settings.invention.validate();
+  settings.inpainting.validate();
   settings.depth_completion.validate();
   settings.depth.validate();
   return settings;
 }
 
-std::string in_words(const cv::Mat& image) {
+std::string size_text(const cv::Mat& image) {
   return std::to_string(image.cols) + "x" + std::to_string(image.rows) + " pixels";
 }
 
 cv::Scalar value_of(Provenance provenance) { return cv::Scalar(static_cast<double>(provenance)); }
 
-// As taken, with nothing known in the hole.
-RestoredView begun(const View& target, const cv::Mat& hole) {
-  RestoredView view;
-  view.colour = target.colour.clone();
-  view.colour.setTo(0, hole);
+// The input with the hole cleared.
+RestoredImage with_hole(const PosedImage& target, const cv::Mat& hole) {
+  RestoredImage result;
+  result.colour = target.colour.clone();
+  result.colour.setTo(0, hole);
   if (!target.depth.empty()) {
-    view.depth = target.depth.clone();
-    view.depth.setTo(0, hole);
+    result.depth = target.depth.clone();
+    result.depth.setTo(0, hole);
   }
-  view.provenance = cv::Mat(hole.size(), CV_8UC1, value_of(Provenance::kMeasured));
-  view.certainty = cv::Mat(hole.size(), CV_32FC1, cv::Scalar(1));
-  view.certainty.setTo(0, hole);
-  view.age = cv::Mat::zeros(hole.size(), CV_32FC1);
-  return view;
+  result.provenance = cv::Mat(hole.size(), CV_8UC1, value_of(Provenance::kMeasured));
+  result.certainty = cv::Mat(hole.size(), CV_32FC1, cv::Scalar(1));
+  result.certainty.setTo(0, hole);
+  result.age = cv::Mat::zeros(hole.size(), CV_32FC1);
+  return result;
 }
 }  // namespace
 
@@ -62,12 +63,12 @@ void RestorationOptions::validate() const {
 }
 
 std::size_t sources_that_fit(int allowed, const Camera& camera) {
-  constexpr double kUsualPixels = 640.0 * 480.0;
-  const double share = std::min(1.0, kUsualPixels / (static_cast<double>(camera.width) * camera.height));
+  constexpr double kReferencePixels = 640.0 * 480.0;
+  const double share = std::min(1.0, kReferencePixels / (static_cast<double>(camera.width) * camera.height));
   return std::max<std::size_t>(1, static_cast<std::size_t>(allowed * share));
 }
 
-std::size_t RestoredView::pixels_of(Provenance from) const {
+std::size_t RestoredImage::pixels_of(Provenance from) const {
   return static_cast<std::size_t>(cv::countNonZero(provenance == static_cast<double>(from)));
 }
 
@@ -78,52 +79,59 @@ StaticSceneRestorer::StaticSceneRestorer(const Camera& camera, const Settings& s
       reprojection_(camera, settings.reprojection),
       inpainter_(std::move(inpainter)) {}
 
-std::optional<SourceView> StaticSceneRestorer::source_view(const View& view) const {
-  check(view);
-  return roslam::source_view(view, settings_.depth);
+std::optional<SourceImage> StaticSceneRestorer::prepare_source(const PosedImage& image) const {
+  check(image);
+  return roslam::prepare_source(image, settings_.depth);
 }
 
-void StaticSceneRestorer::check(const View& target) const {
+void StaticSceneRestorer::check(const PosedImage& target) const {
   const cv::Size size(camera_.width, camera_.height);
   if (target.colour.type() != CV_8UC3 || target.colour.size() != size)
-    throw InputError("the picture to restore is no 8-bit BGR image of the camera's size but has " +
-                     in_words(target.colour));
+    throw InputError(
+        "the image to restore is not an 8-bit BGR image (CV_8UC3) of the camera's size; it has " +
+        size_text(target.colour));
   if (!target.depth.empty() && (target.depth.type() != CV_32FC1 || target.depth.size() != size))
-    throw InputError("the depth to restore is not in metres (CV_32FC1) and of the camera's size; it has " +
-                     in_words(target.depth));
+    throw InputError(
+        "the depth to restore is not a depth image in metres (CV_32FC1) of the camera's size; it has " +
+        size_text(target.depth));
   if (!target.removed.empty() && (target.removed.type() != CV_8UC1 || target.removed.size() != size))
-    throw InputError("the mask of what was removed is no 8-bit image of the camera's size but has " +
-                     in_words(target.removed));
+    throw InputError(
+        "the mask of removed objects is not an 8-bit image (CV_8UC1) of the camera's size; it has " +
+        size_text(target.removed));
 }
 
-RestoredView StaticSceneRestorer::restore(const View& target, const std::vector<RemovedRegion>& regions,
-                                          std::span<const SourceView* const> sources) {
+RestoredImage StaticSceneRestorer::restore(const PosedImage& target,
+                                           const std::vector<RemovedRegion>& regions,
+                                           std::span<const SourceImage* const> sources) {
   check(target);
   const cv::Mat hole =
       target.removed.empty() ? cv::Mat::zeros(target.colour.size(), CV_8UC1) : cv::Mat(target.removed != 0);
-  RestoredView view = begun(target, hole);
-  if (cv::countNonZero(hole) == 0) return view;
+  RestoredImage result = with_hole(target, hole);
+  if (cv::countNonZero(hole) == 0) return result;
 
-  cv::Mat open = hole.clone();
+  cv::Mat unfilled = hole.clone();
   if (settings_.restoration.reproject) {
     cv::Mat area;
     cv::dilate(hole, area,
                cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * kSeamRim + 1, 2 * kSeamRim + 1}));
-    const ReprojectedArea seen = reprojection_.fill(target, area, sources);
-    const cv::Mat filled = seen.filled & hole & (seen.certainty >= settings_.restoration.min_certainty);
-    matched_to_rim(target.colour, seen.colour, seen.filled, hole).copyTo(view.colour, filled);
-    if (!view.depth.empty()) seen.depth.copyTo(view.depth, filled);
-    seen.certainty.copyTo(view.certainty, filled);
-    seen.age.copyTo(view.age, filled);
-    view.provenance.setTo(value_of(Provenance::kReprojected), filled);
-    open.setTo(0, filled);
+    const ReprojectedArea reprojected = reprojection_.fill(target, area, sources);
+    const cv::Mat filled =
+        reprojected.filled & hole & (reprojected.certainty >= settings_.restoration.min_certainty);
+    matched_to_rim(target.colour, reprojected.colour, reprojected.filled, hole).copyTo(result.colour, filled);
+    if (!result.depth.empty()) reprojected.depth.copyTo(result.depth, filled);
+    reprojected.certainty.copyTo(result.certainty, filled);
+    reprojected.age.copyTo(result.age, filled);
+    result.provenance.setTo(value_of(Provenance::kReprojected), filled);
+    unfilled.setTo(0, filled);
   }
-  view.provenance.setTo(value_of(Provenance::kInvented), open);
-  if (!settings_.restoration.invent || cv::countNonZero(open) == 0) return view;
-  view.colour = invent(view.colour, open, regions, inpainter_.get(), settings_.invention);
-  if (!view.depth.empty())
-    completed_depth(view.depth, open, settings_.depth_completion).copyTo(view.depth, open);
-  return view;
+  result.provenance.setTo(value_of(Provenance::kInpainted), unfilled);
+  if (!settings_.restoration.inpaint || !(inpainter_ || has_diffusion_inpainting()) ||
+      cv::countNonZero(unfilled) == 0)
+    return result;
+  result.colour = inpaint_hole(result.colour, unfilled, regions, inpainter_.get(), settings_.inpainting);
+  if (!result.depth.empty())
+    completed_depth(result.depth, unfilled, settings_.depth_completion).copyTo(result.depth, unfilled);
+  return result;
 }
 
 }  // namespace roslam

@@ -4,42 +4,19 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
-#include <mutex>
-#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/dnn.hpp>
 #include <system_error>
 
-#include "roslam/error.hpp"
-#include "roslam/out_of_memory.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/out_of_memory.hpp"
 
 namespace roslam {
 
 namespace {
-constexpr std::uintmax_t kLargestModel = 256U << 20U;             // bytes; ours has a few MB
-constexpr const char* kRemedy = "choose a smaller working side";  // where memory is short
+constexpr std::uintmax_t kLargestModel = 256U << 20U;             // bytes; the one supplied has a few MB
+constexpr const char* kRemedy = "choose a smaller working side";  // if memory runs out
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
-
-// OpenCV prints what it then throws; callers report it themselves, once.
-class QuietOpenCv {
- public:
-  QuietOpenCv() {
-    const std::scoped_lock lock(mutex_);
-    if (quiet_++ == 0) before_ = cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-  }
-  ~QuietOpenCv() {
-    const std::scoped_lock lock(mutex_);
-    if (--quiet_ == 0) cv::utils::logging::setLogLevel(before_);
-  }
-  QuietOpenCv(const QuietOpenCv&) = delete;
-  QuietOpenCv& operator=(const QuietOpenCv&) = delete;
-
- private:
-  // OpenCV has one level for the whole process, and networks run on several threads.
-  static inline std::mutex mutex_;
-  static inline int quiet_ = 0;
-  static inline cv::utils::logging::LogLevel before_ = cv::utils::logging::LOG_LEVEL_WARNING;
-};
 
 class OpenCvInference : public Inference {
  public:
@@ -50,7 +27,6 @@ class OpenCvInference : public Inference {
   }
 
   cv::Mat run(const cv::Mat& input) override {
-    const QuietOpenCv quiet;
     try {
       net_.setInput(input);
       return net_.forward();
@@ -72,8 +48,7 @@ std::string read_model(const std::filesystem::path& model) {
     throw ModelError(model.string() + ": no such model file; expected the weights as an ONNX file");
   }
   if (std::filesystem::file_size(model, error) > kLargestModel || error) {
-    throw ModelError(model.string() +
-                     ": larger than any model of this program; give an ONNX file of its own training");
+    throw ModelError(model.string() + ": larger than 256 MB; give an ONNX file made by training/");
   }
   std::ifstream in(model, std::ios::binary);
   std::string bytes(std::istreambuf_iterator<char>(in), {});
@@ -85,14 +60,13 @@ std::string read_model(const std::filesystem::path& model) {
 
 std::unique_ptr<Inference> load_opencv_inference(const std::string& bytes,
                                                  const std::filesystem::path& model) {
-  const QuietOpenCv quiet;
   try {
     cv::dnn::Net net = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
-    if (net.empty()) throw ModelError(model.string() + ": holds no network; install the model again");
+    if (net.empty()) throw ModelError(model.string() + ": contains no network; install the model again");
     return std::make_unique<OpenCvInference>(std::move(net), model);
   } catch (const cv::Exception& error) {
     throw_if_out_of_memory(error, model, kRemedy);
-    throw ModelError(model.string() + ": is damaged or no ONNX network that OpenCV can run (" +
+    throw ModelError(model.string() + ": is damaged or not an ONNX network that OpenCV can run (" +
                      first_line(error.err) + "); install the model again");
   }
 }

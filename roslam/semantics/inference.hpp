@@ -6,10 +6,13 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "roslam/common/export.hpp"
+#include "roslam/semantics/segmenter_options.hpp"
+
 namespace roslam {
 
-/// Runs a network of one input and one output.
-class Inference {
+/// Runs a network with one input and one output. Not thread safe.
+class ROSLAM_EXPORT Inference {
  public:
   Inference() = default;
   Inference(const Inference&) = delete;
@@ -21,25 +24,18 @@ class Inference {
   virtual cv::Mat run(const cv::Mat& input) = 0;
 };
 
-/// What runs the network.
-enum class InferenceBackend {
-  kAutomatic,   ///< ONNX Runtime where it was found when building, else OpenCV
-  kOpenCv,      ///< OpenCV's dnn module
-  kOnnxRuntime  ///< ONNX Runtime, an optional faster one
-};
-
 /// True if the library was built with ONNX Runtime.
-bool has_onnx_runtime();
+ROSLAM_EXPORT bool has_onnx_runtime();
 
 /// Loads an ONNX file. Throws ModelError naming the file if it is missing or not a network the backend can
-/// run, or if the backend is not there.
-std::unique_ptr<Inference> load_inference(const std::filesystem::path& model,
-                                          InferenceBackend backend = InferenceBackend::kAutomatic);
+/// run, or if the backend is not available.
+ROSLAM_EXPORT std::unique_ptr<Inference> load_inference(
+    const std::filesystem::path& model, InferenceBackend backend = InferenceBackend::kAutomatic);
 
-// The backends themselves; bytes: the file's content, model: its name for messages.
-std::unique_ptr<Inference> load_opencv_inference(const std::string& bytes,
-                                                 const std::filesystem::path& model);
-std::unique_ptr<Inference> load_onnx_runtime_inference(const std::string& bytes,
-                                                       const std::filesystem::path& model);
+// The individual backends; bytes: the file's content, model: its name for messages.
+ROSLAM_EXPORT std::unique_ptr<Inference> load_opencv_inference(const std::string& bytes,
+                                                               const std::filesystem::path& model);
+ROSLAM_EXPORT std::unique_ptr<Inference> load_onnx_runtime_inference(const std::string& bytes,
+                                                                     const std::filesystem::path& model);
 
 }  // namespace roslam

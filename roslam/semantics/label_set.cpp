@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam {
 
@@ -23,7 +23,7 @@ constexpr std::array<Movable, kClasses> kMovable{
     Movable::kNone, Movable::kPerson, Movable::kPerson, Movable::kCar,    Movable::kCar,
     Movable::kCar,  Movable::kCar,    Movable::kCar,    Movable::kBicycle};
 
-// Colours a person tells apart at a glance: greys and greens for what stands, warm colours for what moves.
+// BGR, easy to tell apart: muted for most static classes, saturated for movable ones.
 const std::array<cv::Vec3b, kClasses> kColours{
     cv::Vec3b(110, 90, 110), cv::Vec3b(190, 150, 190), cv::Vec3b(95, 95, 95),   cv::Vec3b(120, 110, 100),
     cv::Vec3b(90, 120, 150), cv::Vec3b(160, 160, 160), cv::Vec3b(60, 190, 240), cv::Vec3b(60, 230, 230),
@@ -113,7 +113,7 @@ cv::Vec3b class_colour(int label) {
 
 cv::Mat label_overlay(const cv::Mat& image, const cv::Mat& labels, double share) {
   if (image.type() != CV_8UC3 || labels.type() != CV_8UC1 || image.size() != labels.size()) {
-    throw InputError("an overlay needs a colour picture and labels of the same size");
+    throw InputError("an overlay needs a colour image and labels of the same size");
   }
   cv::Mat overlay = image.clone();
   const cv::Mat movable = movable_mask(labels);
@@ -123,9 +123,9 @@ cv::Mat label_overlay(const cv::Mat& image, const cv::Mat& labels, double share)
   for (int y = 0; y < image.rows; ++y) {
     auto* out = overlay.ptr<cv::Vec3b>(y);
     const auto* label = labels.ptr<std::uint8_t>(y);
-    const auto* moves = movable.ptr<std::uint8_t>(y);
+    const auto* is_movable = movable.ptr<std::uint8_t>(y);
     for (int x = 0; x < image.cols; ++x) {
-      const double part = moves[x] != 0 ? share : 0.5 * share;
+      const double part = is_movable[x] != 0 ? share : 0.5 * share;
       const cv::Vec3b colour = class_colour(label[x]);
       for (int c = 0; c < 3; ++c) out[x][c] = mix(out[x][c], colour[c], part);
     }

@@ -4,9 +4,9 @@
 #include <array>
 #include <vector>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 #include "roslam/semantics/inference.hpp"
-#include "roslam/semantics/onnx_picture_size.hpp"
+#include "roslam/semantics/onnx_image_size.hpp"
 
 namespace roslam {
 
@@ -27,7 +27,7 @@ class OnnxRuntimeInference : public Inference {
         session_(environment_, bytes.data(), bytes.size(), single_threaded()) {
     if (session_.GetInputCount() != 1 || session_.GetOutputCount() != 1) {
       throw ModelError(model_.string() +
-                       ": has not one input and one output; install the model of this version");
+                       ": does not have one input and one output; install the model of this version");
     }
     const Ort::AllocatorWithDefaultOptions allocator;
     input_name_ = session_.GetInputNameAllocated(0, allocator).get();
@@ -39,15 +39,15 @@ class OnnxRuntimeInference : public Inference {
       const std::array<std::int64_t, 4> shape{input.size[0], input.size[1], input.size[2], input.size[3]};
       const auto memory = Ort::MemoryInfo::CreateCpu(OrtArenaAllocator, OrtMemTypeDefault);
       // ONNX Runtime does not write to its inputs; its interface lacks the const.
-      const Ort::Value picture = Ort::Value::CreateTensor<float>(
-          memory, const_cast<float*>(input.ptr<float>()), input.total(), shape.data(), shape.size());
+      const Ort::Value image = Ort::Value::CreateTensor<float>(memory, const_cast<float*>(input.ptr<float>()),
+                                                               input.total(), shape.data(), shape.size());
       const char* input_name = input_name_.c_str();
       const char* output_name = output_name_.c_str();
-      outputs_ = session_.Run(Ort::RunOptions(nullptr), &input_name, &picture, 1, &output_name, 1);
+      outputs_ = session_.Run(Ort::RunOptions(nullptr), &input_name, &image, 1, &output_name, 1);
       const auto result = outputs_.front().GetTensorTypeAndShapeInfo();
       if (result.GetElementType() != ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT) {
         throw ModelError(model_.string() +
-                         ": gives no 32-bit scores; install the model that belongs to this version");
+                         ": does not output 32-bit float scores; install the model of this version");
       }
       const auto sizes = result.GetShape();
       const std::vector<int> size(sizes.begin(), sizes.end());
@@ -72,9 +72,9 @@ class OnnxRuntimeInference : public Inference {
 std::unique_ptr<Inference> load_onnx_runtime_inference(const std::string& bytes,
                                                        const std::filesystem::path& model) {
   try {
-    return std::make_unique<OnnxRuntimeInference>(with_open_picture_size(bytes), model);
+    return std::make_unique<OnnxRuntimeInference>(with_open_image_size(bytes), model);
   } catch (const Ort::Exception& error) {
-    throw ModelError(model.string() + ": is damaged or no ONNX network that ONNX Runtime can run (" +
+    throw ModelError(model.string() + ": is damaged or not an ONNX network that ONNX Runtime can run (" +
                      error.what() + "); install the model again");
   }
 }

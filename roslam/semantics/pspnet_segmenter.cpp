@@ -8,18 +8,18 @@
 #include <string>
 #include <system_error>
 
-#include "roslam/error.hpp"
-#include "roslam/geometry/stopwatch.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/resources.hpp"
+#include "roslam/common/stopwatch.hpp"
 #include "roslam/semantics/score_labels.hpp"
-#include "roslam/shipped_file.hpp"
 
 namespace roslam {
 
 namespace {
-constexpr int kSizeMultiple = 32;  // what the sides the network sees are multiples of
+constexpr int kSizeMultiple = 32;  // both sides of the input image are multiples of this
 
 cv::Mat as_bgr(const cv::Mat& image) {
-  if (image.empty()) throw InputError("segmentation needs a picture, this one is empty");
+  if (image.empty()) throw InputError("segmentation needs an image, this one is empty");
   cv::Mat bgr;
   switch (image.type()) {
     case CV_8UC3:
@@ -31,16 +31,10 @@ cv::Mat as_bgr(const cv::Mat& image) {
       cv::cvtColor(image, bgr, cv::COLOR_GRAY2BGR);
       return bgr;
     default:
-      throw InputError("segmentation needs an 8-bit picture with 1, 3 or 4 channels");
+      throw InputError("segmentation needs an 8-bit image with 1, 3 or 4 channels");
   }
 }
 }  // namespace
-
-void SegmenterOptions::validate() const {
-  if (working_side < kSizeMultiple || working_side > 4096) {
-    throw OptionsError("segmenter.working_side must be 32 to 4096 pixels");
-  }
-}
 
 cv::Size working_size(const cv::Size& image, int working_side) {
   const double scale = static_cast<double>(working_side) / std::max(image.width, image.height);
@@ -56,9 +50,9 @@ PspnetSegmenter::PspnetSegmenter(const std::filesystem::path& model, const Segme
   options_.validate();
   inference_ = load_inference(model, backend);
   const int size[] = {1, 3, 2 * kSizeMultiple,
-                      2 * kSizeMultiple};  // a first look: has it the shape we expect?
+                      2 * kSizeMultiple};  // trial run to check the shape of the output
   if (!cv::checkRange(scores_for(cv::Mat(4, size, CV_32F, cv::Scalar(0))))) {
-    throw ModelError(model_.string() + ": gives scores that are no numbers; install the model again");
+    throw ModelError(model_.string() + ": gives scores that are not finite; install the model again");
   }
 }
 
@@ -74,7 +68,7 @@ cv::Mat PspnetSegmenter::scores_for(const cv::Mat& blob) {
   if (scores.size[2] < 1 || scores.size[2] > blob.size[2] || scores.size[3] < 1 ||
       scores.size[3] > blob.size[3]) {
     throw ModelError(model_.string() +
-                     ": gives scores of another shape than its picture; install the model that "
+                     ": gives scores whose shape does not match the image; install the model that "
                      "belongs to this version");
   }
   return scores;
@@ -84,14 +78,15 @@ Segmentation PspnetSegmenter::segment(const cv::Mat& image) {
   const Stopwatch watch;
   const cv::Mat bgr = as_bgr(image);
   const cv::Size size = working_size(bgr.size(), options_.working_side);
-  cv::resize(bgr, seen_, size, 0, 0, size.area() < bgr.size().area() ? cv::INTER_AREA : cv::INTER_LINEAR);
-  cv::dnn::blobFromImage(seen_, blob_, 1.0 / 255.0, {}, {}, true);
+  cv::resize(bgr, input_image_, size, 0, 0,
+             size.area() < bgr.size().area() ? cv::INTER_AREA : cv::INTER_LINEAR);
+  cv::dnn::blobFromImage(input_image_, blob_, 1.0 / 255.0, {}, {}, true);
   Segmentation result = labels_from_scores(scores_for(blob_), bgr.size());
   result.seconds = watch.seconds();
   return result;
 }
 
-std::filesystem::path shipped_segmentation_model() { return shipped_file("roslam-pspnet.onnx"); }
+std::filesystem::path find_segmentation_model() { return find_resource("roslam-pspnet.onnx"); }
 
 ModelError missing_segmentation_model() {
   return ModelError(

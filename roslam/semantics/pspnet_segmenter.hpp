@@ -4,27 +4,21 @@
 #include <filesystem>
 #include <memory>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/export.hpp"
 #include "roslam/semantics/inference.hpp"
 #include "roslam/semantics/segmenter.hpp"
+#include "roslam/semantics/segmenter_options.hpp"
 
 namespace roslam {
 
-struct SegmenterOptions {
-  int working_side =
-      416;  ///< pixels, longer side of the picture the network sees; less is faster, more is finer
+/// Size of the input image of the network: the longer side becomes working_side, both are multiples of 32.
+ROSLAM_EXPORT cv::Size working_size(const cv::Size& image, int working_side);
 
-  /// Throws OptionsError naming the field.
-  void validate() const;
-};
-
-/// Size of the picture the network sees: the longer side becomes working_side, both are multiples of 32.
-cv::Size working_size(const cv::Size& image, int working_side);
-
-/// The improved PSPNet (section 3.2) behind the Segmenter interface.
-class PspnetSegmenter : public Segmenter {
+/// The improved PSPNet of the paper (section 3.2).
+class ROSLAM_EXPORT PspnetSegmenter : public Segmenter {
  public:
-  /// model: an ONNX file from training/ that takes RGB from 0 to 1 and gives scores of 19 classes. Throws
+  /// model: an ONNX file from training/ that takes RGB from 0 to 1 and outputs scores of 19 classes. Throws
   /// ModelError naming the file and what was expected, or OptionsError.
   explicit PspnetSegmenter(const std::filesystem::path& model, const SegmenterOptions& options = {},
                            InferenceBackend backend = InferenceBackend::kAutomatic);
@@ -39,15 +33,15 @@ class PspnetSegmenter : public Segmenter {
   std::filesystem::path model_;
   SegmenterOptions options_;
   std::unique_ptr<Inference> inference_;
-  cv::Mat seen_;  // kept, as fetching fresh memory for each picture takes longer than filling it
+  cv::Mat input_image_;  // reused between calls: allocating it for each image takes longer than filling it
   cv::Mat blob_;
 };
 
-/// The weights that ship with the program: models/roslam-pspnet.onnx beside the program or its build folder,
+/// The weights supplied with the program: models/roslam-pspnet.onnx beside the program or its build folder,
 /// or in share/roslam/models of an installation. Empty if there are none.
-std::filesystem::path shipped_segmentation_model();
+ROSLAM_EXPORT std::filesystem::path find_segmentation_model();
 
-/// What to throw where they are needed and not there.
-ModelError missing_segmentation_model();
+/// The error to throw if they are needed but missing.
+ROSLAM_EXPORT ModelError missing_segmentation_model();
 
 }  // namespace roslam

@@ -11,7 +11,7 @@ namespace roslam {
 namespace {
 using Row = std::array<float, kClasses>;
 
-// The grid points on both sides of each pixel along one axis, and the weight of the second.
+// Linear interpolation along one axis: the grid points before and after each pixel, weight of the second.
 struct Axis {
   std::vector<int> first;
   std::vector<int> second;
@@ -39,7 +39,7 @@ Row mixed(const Row& a, const Row& b, float weight) {
   return row;
 }
 
-// The network's scores, a plane a class, with the best class of each grid point.
+// The network's scores, one plane per class, with the best class of each grid point.
 struct Grid {
   int rows;
   int columns;
@@ -68,7 +68,7 @@ struct Grid {
            static_cast<std::size_t>(column);
   }
 
-  // Between two points of a column, one below the other.
+  // Interpolated between two points of a column.
   Row scores_between(std::size_t above, std::size_t below, float weight) const {
     Row row;
     for (std::size_t c = 0; c < kClasses; ++c) {
@@ -78,7 +78,7 @@ struct Grid {
   }
 };
 
-// The probability of each point's best class is its share in the softmax.
+// Softmax probability of each point's best class.
 cv::Mat probabilities(const Grid& grid) {
   const cv::Mat highest(1, static_cast<int>(grid.points()), CV_32F, const_cast<float*>(grid.highest.data()));
   cv::Mat sum = cv::Mat::zeros(highest.size(), CV_32F);

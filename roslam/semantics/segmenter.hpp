@@ -4,21 +4,22 @@
 #include <array>
 #include <opencv2/core.hpp>
 
+#include "roslam/common/export.hpp"
 #include "roslam/semantics/label_set.hpp"
 
 namespace roslam {
 
-/// What a network says about one picture.
-struct Segmentation {
-  cv::Mat labels;                            ///< CV_8UC1 of the picture's size: class 0..18 of each pixel
+/// Semantic segmentation of one image.
+struct ROSLAM_EXPORT Segmentation {
+  cv::Mat labels;                            ///< CV_8UC1 of the image's size: class 0..18 of each pixel
   std::array<float, kClasses> confidence{};  ///< mean probability of each class where it was chosen, 0 where
                                              ///< it has no point of the network's grid
-  cv::Mat probability;   ///< CV_32FC1, of the class chosen, on a coarse grid over the picture; may be empty
-  double seconds = 0.0;  ///< processor time from picture to labels
+  cv::Mat probability;   ///< CV_32FC1, of the chosen class, on a coarse grid over the image; may be empty
+  double seconds = 0.0;  ///< processor time from image to labels
 };
 
-/// Labels every pixel of a picture. Not safe to call from several threads at once; give each its own.
-class Segmenter {
+/// Labels every pixel of an image. Not thread safe; use one instance per thread.
+class ROSLAM_EXPORT Segmenter {
  public:
   Segmenter() = default;
   Segmenter(const Segmenter&) = delete;

@@ -2,8 +2,10 @@
 #include "roslam/tracking/keyframe_policy.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam {
 
@@ -33,9 +35,9 @@ KeyframePolicy::KeyframePolicy(const KeyframePolicyOptions& options) : options_(
   options_.validate();
 }
 
-bool KeyframePolicy::promotes(const TrackedFrame& frame, const Map& map, bool mapper_idle) const {
+bool KeyframePolicy::needs_keyframe(const TrackedFrame& frame, const Map& map, bool mapper_idle) const {
   if (!options_.enabled || frame.state != TrackingState::kTracking) return false;
-  if (!frame.reference.is_valid()) return true;  // a world begins
+  if (!frame.reference.is_valid()) return true;  // the first of a submap
   const double elapsed = frame.timestamp - last_timestamp_;
   if (elapsed < options_.min_interval) return false;
 
@@ -47,12 +49,30 @@ bool KeyframePolicy::promotes(const TrackedFrame& frame, const Map& map, bool ma
     ++(frame.landmarks[i].is_valid() ? tracked_near : new_near);
   }
   const bool needs_near = tracked_near < options_.min_tracked_near && new_near > options_.min_new_near;
-  // What something that moves hides for the moment is not a part of the scene that has not been mapped.
+  // Landmarks that dynamic objects hide do not count as lost overlap.
   const int reference = landmarks_of(map, frame.reference) - frame.hidden;
   const bool little_overlap = frame.inliers < options_.min_overlap * reference;
   const bool weak = frame.inliers < 0.25 * reference || needs_near;
   const bool due = elapsed >= options_.max_interval;
   return (due || mapper_idle || weak) && (little_overlap || needs_near);
+}
+
+int count_hidden_landmarks(const Map& map, const TrackedFrame& frame, const Camera& camera,
+                           const cv::Mat& mask) {
+  const Keyframe* reference = map.find(frame.reference);
+  if (mask.empty() || reference == nullptr || !frame.T_camera_world) return 0;
+  int hidden = 0;
+  for (const LandmarkId id : reference->landmarks) {
+    const Landmark* landmark = map.find(id);
+    if (landmark == nullptr) continue;
+    const Eigen::Vector3d point = *frame.T_camera_world * landmark->position;
+    if (point.z() <= 0.0) continue;
+    const Eigen::Vector2d pixel = camera.distort(camera.project(point));
+    const int x = static_cast<int>(std::lround(pixel.x()));
+    const int y = static_cast<int>(std::lround(pixel.y()));
+    if (x >= 0 && y >= 0 && x < mask.cols && y < mask.rows && mask.at<std::uint8_t>(y, x) != 0) ++hidden;
+  }
+  return hidden;
 }
 
 }  // namespace roslam

@@ -5,21 +5,9 @@
 
 #include "roslam/map/map.hpp"
 #include "roslam/tracking/tracker.hpp"
+#include "roslam/tracking/tracking_options.hpp"
 
 namespace roslam {
-
-struct KeyframePolicyOptions {
-  bool enabled = true;         ///< false: no frame becomes a keyframe, the map stays as it is
-  double max_interval = 1.0;   ///< seconds after which a keyframe is taken if the mapper is idle
-  double min_interval = 0.0;   ///< seconds between keyframes at least
-  double min_overlap = 0.6;    ///< share of the reference keyframe's landmarks below which a new one is due
-  int min_tracked_near = 100;  ///< with fewer near landmarks tracked, and many near points unused, one is due
-  int min_new_near = 70;       ///< near points without a landmark that make a keyframe worth it
-  double near = 3.0;           ///< metres; what is nearer counts as near
-
-  /// Throws OptionsError naming the field.
-  void validate() const;
-};
 
 /// Decides which frames become keyframes.
 class KeyframePolicy {
@@ -27,15 +15,23 @@ class KeyframePolicy {
   /// Throws OptionsError.
   explicit KeyframePolicy(const KeyframePolicyOptions& options);
 
-  /// True if the frame should become a keyframe. mapper_idle: the mapper could start on it at once.
-  bool promotes(const TrackedFrame& frame, const Map& map, bool mapper_idle) const;
+  /// True if the frame should become a keyframe. mapper_idle: the mapper has no keyframe to process.
+  bool needs_keyframe(const TrackedFrame& frame, const Map& map, bool mapper_idle) const;
 
-  /// Tells that the frame became a keyframe.
-  void promoted(const TrackedFrame& frame) { last_timestamp_ = frame.timestamp; }
+  /// To be called when the frame became a keyframe.
+  void keyframe_created(const TrackedFrame& frame) { last_timestamp_ = frame.timestamp; }
+
+  /// To be called when the source's clock was reset to that time (seconds).
+  void restart_clock(double timestamp) { last_timestamp_ = timestamp; }
 
  private:
   KeyframePolicyOptions options_;
   double last_timestamp_ = 0.0;
 };
+
+/// Landmarks of the frame's reference keyframe that project into the mask (CV_8UC1 of the image as taken,
+/// nonzero on dynamic objects; may be empty), for TrackedFrame::hidden. 0 where the frame has no pose.
+int count_hidden_landmarks(const Map& map, const TrackedFrame& frame, const Camera& camera,
+                           const cv::Mat& mask);
 
 }  // namespace roslam

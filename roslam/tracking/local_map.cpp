@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam {
 
@@ -37,7 +37,7 @@ void LocalMap::collect_keyframes(const Map& map, const std::vector<LandmarkId>& 
   if (keyframes_.size() > limit) keyframes_.resize(limit);
   std::vector<bool> is_in(map.keyframe_slots(), false);
   for (const KeyframeId id : keyframes_) is_in[id.index()] = true;
-  // Neighbours of the best keyframe bring in what comes into view next.
+  // Covisible keyframes of the reference add landmarks about to come into view.
   if (!keyframes_.empty()) {
     int added = 0;
     for (const auto& [id, shared] : map.covisible(reference_)) {

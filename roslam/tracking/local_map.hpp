@@ -4,24 +4,17 @@
 #include <vector>
 
 #include "roslam/map/map.hpp"
+#include "roslam/tracking/tracking_options.hpp"
 
 namespace roslam {
 
-struct LocalMapOptions {
-  int max_keyframes = 40;  ///< keyframes whose landmarks are searched for
-  int neighbours = 5;      ///< covisible keyframes added for each keyframe that sees the frame's landmarks
-
-  /// Throws OptionsError naming the field.
-  void validate() const;
-};
-
-/// The part of the map around a frame: the keyframes that see what it sees, their neighbours, and all their
-/// landmarks.
+/// The part of the map around a frame: the keyframes that share landmarks with it, those covisible with the
+/// reference keyframe, and the landmarks of all these.
 class LocalMap {
  public:
   explicit LocalMap(const LocalMapOptions& options) : options_(options) {}
 
-  /// seen: landmark of each point of the frame, or none. If none is seen, fallback and its neighbours serve.
+  /// seen: landmark of each point of the frame, or none. If there is none at all, fallback is the reference.
   void update(const Map& map, const std::vector<LandmarkId>& seen, KeyframeId fallback);
 
   const std::vector<LandmarkId>& landmarks() const { return landmarks_; }

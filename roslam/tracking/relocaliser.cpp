@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "roslam/error.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam {
 
@@ -12,12 +12,12 @@ void RelocaliserOptions::validate() const {
   if (min_inliers < 6) throw OptionsError("relocaliser.min_inliers must be at least 6");
 }
 
-std::optional<PlaceMatch> Relocaliser::find(const Map& map, const ObservedFrame& frame,
-                                            std::span<const KeyframeId> similar, bool search_all) {
+std::optional<VerifiedMatch> Relocaliser::find(const Map& map, const ObservedFrame& frame,
+                                               std::span<const KeyframeId> similar, bool search_all) {
   const auto candidates = static_cast<std::size_t>(options_.candidates);
-  const auto by_looks = similar.first(std::min(similar.size(), candidates));
-  for (const KeyframeId id : by_looks) {
-    if (auto match = check_.match(map, id, frame, options_.min_inliers)) return match;
+  const auto by_similarity = similar.first(std::min(similar.size(), candidates));
+  for (const KeyframeId id : by_similarity) {
+    if (auto match = verifier_.match(map, id, frame, options_.min_inliers)) return match;
   }
   std::vector<KeyframeId> keyframes = map.keyframe_ids();
   std::reverse(keyframes.begin(), keyframes.end());
@@ -26,8 +26,9 @@ std::optional<PlaceMatch> Relocaliser::find(const Map& map, const ObservedFrame&
   const auto tries = std::min(candidates, keyframes.size());
   for (std::size_t i = 0; i < tries; ++i) {
     const KeyframeId id = keyframes[(next_ + i) % keyframes.size()];
-    if (std::find(by_looks.begin(), by_looks.end(), id) != by_looks.end()) continue;  // checked above
-    if (auto match = check_.match(map, id, frame, options_.min_inliers)) return match;
+    const bool is_tried = std::find(by_similarity.begin(), by_similarity.end(), id) != by_similarity.end();
+    if (is_tried) continue;
+    if (auto match = verifier_.match(map, id, frame, options_.min_inliers)) return match;
   }
   if (search_all) next_ = (next_ + tries) % keyframes.size();
   return std::nullopt;

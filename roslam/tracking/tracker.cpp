@@ -4,17 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
-#include "roslam/error.hpp"
-#include "roslam/geometry/stopwatch.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/common/stopwatch.hpp"
 
 namespace roslam {
 
 namespace {
-// Marks points matched with points of the last frame that are not landmarks: they help with the pose and are
-// forgotten afterwards.
-constexpr LandmarkId kTemporary{LandmarkId::kNone - 1};
+// Marks matches with points of the last frame that have no landmark (ORB-SLAM's temporal points): they are
+// used for the pose of this frame only.
+constexpr LandmarkId kUnmapped{LandmarkId::kNone - 1};
 
-// World axes of the first camera, taken to look ahead and level: x forward, y left, z up (REP 103).
+// The first camera defines the world frame, assumed level: x forward, y left, z up (REP 103).
 SE3 first_T_camera_world() {
   Eigen::Matrix3d R;
   R << 0, -1, 0,  //
@@ -52,7 +52,7 @@ void TrackerOptions::validate() const {
     throw OptionsError("tracker.hidden_share must be 0 to 1");
   if (!(max_predicted >= 0.0 && max_predicted <= 60.0))
     throw OptionsError("tracker.max_predicted must be 0 to 60 seconds");
-  if (new_world_frames < 0) throw OptionsError("tracker.new_world_frames must not be negative");
+  if (new_submap_after_lost < 0) throw OptionsError("tracker.new_submap_after_lost must not be negative");
   if (recently_lost_frames < 0) throw OptionsError("tracker.recently_lost_frames must not be negative");
 }
 
@@ -62,8 +62,9 @@ Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
       settings_(settings),
       matcher_(settings.matcher),
       local_map_(settings.local_map),
-      relocaliser_(settings.relocaliser, PlaceCheck(camera, {settings.place_check, settings.matcher,
-                                                             settings.pose, settings.noise})) {
+      relocaliser_(settings.relocaliser,
+                   GeometricVerifier(camera, {settings.geometric_verifier, settings.matcher, settings.pose,
+                                              settings.noise})) {
   settings.tracker.validate();
   settings.matcher.validate();
   settings.pose.validate();
@@ -75,8 +76,8 @@ Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
 TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double timestamp,
                             const FrameHint& hint) {
   times_ = {};
-  passing_points_.clear();
-  passing_positions_.clear();
+  unmapped_points_.clear();
+  unmapped_positions_.clear();
   TrackedFrame frame;
   frame.timestamp = timestamp;
   frame.landmarks.resize(view->size());
@@ -90,13 +91,13 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   if (found) {
     state_ = TrackingState::kTracking;
     frames_lost_ = frames_unrecognised_ = 0;
-    frame.trust = std::min(1.0, frame.inliers / static_cast<double>(settings_.tracker.trusted_inliers));
-    count_predictions(frame);
+    frame.quality = std::min(1.0, frame.inliers / static_cast<double>(settings_.tracker.trusted_inliers));
+    count_found(frame);
     remember(frame);
   } else if (was_known && predict_hidden(frame, hint)) {
     state_ = TrackingState::kPredicted;
   } else if (const bool could_start = can_start(frame);
-             could_start && ++frames_unrecognised_ == settings_.tracker.new_world_frames) {
+             could_start && ++frames_unrecognised_ == settings_.tracker.new_submap_after_lost) {
     return initialise(std::move(frame));
   } else {
     ++frames_lost_;
@@ -117,13 +118,13 @@ bool Tracker::can_start(const TrackedFrame& frame) const {
   return known >= settings_.tracker.min_initial_points;
 }
 
-// The first frame of a world.
+// The first frame of a submap.
 TrackedFrame Tracker::initialise(TrackedFrame frame) {
   frame.T_camera_world = first_T_camera_world();
   frame.landmarks.assign(frame.view->size(), {});
   frame.reference = {};
   frame.inliers = 0;
-  frame.trust = 1.0;
+  frame.quality = 1.0;
   frame.state = state_ = TrackingState::kTracking;
   frames_lost_ = frames_unrecognised_ = 0;
   velocity_.reset();
@@ -140,8 +141,7 @@ std::optional<SE3> Tracker::predicted_pose(double timestamp) const {
 bool Tracker::follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_world) {
   const SE3 predicted = T_camera_world.value_or(predict_pose(frame.timestamp));
   constexpr float kWider = 3.0F;
-  // Where the motion is unknown, what lies near in the image may be the wrong thing: descriptors alone
-  // decide.
+  // Without a motion estimate a search around the projection may match wrong points: match by descriptors.
   const bool matched = ((velocity_ || T_camera_world) && match_last_frame(frame, predicted, 1.0F)) ||
                        match_reference(frame) || match_last_frame(frame, predicted, kWider);
   return matched && last_.reference.is_valid() &&
@@ -156,13 +156,13 @@ std::optional<SE3> Tracker::last_pose() const {
 SE3 Tracker::predict_pose(double timestamp) const {
   const SE3 last = *last_pose();
   if (!velocity_) return last;
-  // Over more than some frames no motion goes on as it was.
-  constexpr double kSteady = 0.1;  // seconds
-  constexpr double kFades = 0.4;   // seconds in which it does
+  // Constant velocity at first, then it decays exponentially: over many frames the model does not hold.
+  constexpr double kSteady = 0.1;  // seconds of constant velocity
+  constexpr double kDecay = 0.4;   // seconds, time constant
   const double elapsed = timestamp - last_.timestamp;
-  const double rest = std::max(elapsed - kSteady, 0.0);
-  const double flown = std::min(elapsed, kSteady) + kFades * (1.0 - std::exp(-rest / kFades));
-  return SE3::exp(*velocity_ * flown) * last;
+  const double beyond = std::max(elapsed - kSteady, 0.0);
+  const double duration = std::min(elapsed, kSteady) + kDecay * (1.0 - std::exp(-beyond / kDecay));
+  return SE3::exp(*velocity_ * duration) * last;
 }
 
 bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor) {
@@ -172,7 +172,7 @@ bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float 
   const ObservedFrame& last = *last_.view;
   std::vector<Eigen::Vector3d> positions;
   std::vector<std::uint32_t> points;
-  std::vector<float> turns;
+  std::vector<float> rotations;
   for (std::size_t i = 0; i < last.size(); ++i) {
     const LandmarkId id = map_.resolve(last_.landmarks[i]);
     const Landmark* landmark = map_.find(id);
@@ -191,12 +191,12 @@ bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float 
                                      settings_.matcher.max_distance, false},
                                     last.descriptors[i], *frame.view, frame.landmarks);
     if (match < 0) continue;
-    frame.landmarks[static_cast<std::size_t>(match)] = landmark != nullptr ? id : kTemporary;
+    frame.landmarks[static_cast<std::size_t>(match)] = landmark != nullptr ? id : kUnmapped;
     positions.push_back(position);
     points.push_back(static_cast<std::uint32_t>(match));
-    turns.push_back(last.angles[i] - frame.view->angles[static_cast<std::size_t>(match)]);
+    rotations.push_back(last.angles[i] - frame.view->angles[static_cast<std::size_t>(match)]);
   }
-  const auto keep = consistent_rotation(turns);
+  const auto keep = consistent_rotation(rotations);
   std::size_t kept = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {
     if (keep[k]) {
@@ -211,14 +211,14 @@ bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float 
   times_.match_frame += watch.seconds();
   frame.T_camera_world = predicted;
   const bool good = first_estimate(frame, positions, points);
-  passing_points_.clear();
-  passing_positions_.clear();
+  unmapped_points_.clear();
+  unmapped_positions_.clear();
   for (std::size_t k = 0; k < points.size(); ++k) {
-    if (frame.landmarks[points[k]] != kTemporary) continue;
-    passing_points_.push_back(points[k]);
-    passing_positions_.push_back(positions[k]);
+    if (frame.landmarks[points[k]] != kUnmapped) continue;
+    unmapped_points_.push_back(points[k]);
+    unmapped_positions_.push_back(positions[k]);
   }
-  std::replace(frame.landmarks.begin(), frame.landmarks.end(), kTemporary, LandmarkId{});
+  std::replace(frame.landmarks.begin(), frame.landmarks.end(), kUnmapped, LandmarkId{});
   return good;
 }
 
@@ -250,7 +250,7 @@ bool Tracker::first_estimate(TrackedFrame& frame, const std::vector<Eigen::Vecto
          frame.inliers >= settings_.tracker.min_agreement * static_cast<double>(points.size());
 }
 
-// Optimises the pose on matches of points with positions in the world; forgets the outliers.
+// Optimises the pose on matches of image points with world positions; unsets the landmarks of outliers.
 bool Tracker::estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
                        const std::vector<std::uint32_t>& points, int min_inliers) {
   if (static_cast<int>(points.size()) < min_inliers) return false;
@@ -277,17 +277,17 @@ void Tracker::match_local_landmarks(TrackedFrame& frame) {
   for (const LandmarkId id : frame.landmarks) {
     if (id.is_valid()) is_matched[id.index()] = true;
   }
-  constexpr float kFrontal =
-      0.998F;  // seen from almost the same direction, a landmark is searched for more closely
+  // Cosine between viewing directions from which the search radius is smaller (as in ORB-SLAM).
+  constexpr float kFrontal = 0.998F;
   for (const LandmarkId id : local_map_.landmarks()) {
     if (is_matched[id.index()]) continue;
     Landmark& landmark = *map_.find(id);
     const auto predicted = predict(landmark, map_, *frame.view, camera_, *frame.T_camera_world);
     if (!predicted) continue;
-    ++landmark.predicted;
-    const float closeness = predicted->view_cosine > kFrontal ? 2.5F : 4.0F;
+    ++landmark.times_visible;
+    const float factor = predicted->view_cosine > kFrontal ? 2.5F : 4.0F;
     const float radius =
-        closeness * static_cast<float>(settings_.matcher.map_radius) * map_.scale(predicted->level);
+        factor * static_cast<float>(settings_.matcher.map_radius) * map_.scale(predicted->level);
     const int match = matcher_.find({predicted->pixel, radius, predicted->level - 1, predicted->level + 1,
                                      predicted->depth, settings_.matcher.max_distance, true},
                                     landmark.descriptor, *frame.view, frame.landmarks);
@@ -309,19 +309,19 @@ bool Tracker::refine_with_local_map(TrackedFrame& frame, KeyframeId near) {
     points.push_back(i);
   }
   if (static_cast<int>(points.size()) < settings_.tracker.scarce_inliers) {
-    for (std::size_t k = 0; k < passing_points_.size(); ++k) {
-      if (frame.landmarks[passing_points_[k]].is_valid()) continue;
-      frame.landmarks[passing_points_[k]] = kTemporary;
-      positions.push_back(passing_positions_[k]);
-      points.push_back(passing_points_[k]);
+    for (std::size_t k = 0; k < unmapped_points_.size(); ++k) {
+      if (frame.landmarks[unmapped_points_[k]].is_valid()) continue;
+      frame.landmarks[unmapped_points_[k]] = kUnmapped;
+      positions.push_back(unmapped_positions_[k]);
+      points.push_back(unmapped_points_[k]);
     }
   }
   const bool good = estimate(frame, positions, points, settings_.tracker.min_inliers);
-  std::replace(frame.landmarks.begin(), frame.landmarks.end(), kTemporary, LandmarkId{});
+  std::replace(frame.landmarks.begin(), frame.landmarks.end(), kUnmapped, LandmarkId{});
   return good;
 }
 
-// Where what moves hides the scene, the camera is taken to go on as it did, for a while.
+// While dynamic objects hide the scene, the pose is extrapolated with the motion model for a limited time.
 bool Tracker::predict_hidden(TrackedFrame& frame, const FrameHint& hint) {
   const bool is_hidden = hint.hidden_share >= settings_.tracker.hidden_share;
   if (!is_hidden || frame.timestamp - last_.timestamp > settings_.tracker.max_predicted) return false;
@@ -334,36 +334,36 @@ bool Tracker::predict_hidden(TrackedFrame& frame, const FrameHint& hint) {
 
 bool Tracker::relocalise(TrackedFrame& frame, const FrameHint& hint) {
   const Stopwatch watch;
-  passing_points_.clear();
-  passing_positions_.clear();
+  unmapped_points_.clear();
+  unmapped_positions_.clear();
   const auto similar = hint.similar_keyframes ? hint.similar_keyframes() : std::vector<KeyframeId>{};
-  // Never known, as at the start in a map of another flight, the camera may be anywhere.
-  const bool may_be_anywhere =
-      last_.view == nullptr || frames_lost_ >= settings_.tracker.recently_lost_frames;
-  const auto found = relocaliser_.find(map_, *frame.view, similar, may_be_anywhere);
+  // No prior on the pose: lost for long, or no frame tracked yet in a loaded map.
+  const bool search_all = last_.view == nullptr || frames_lost_ >= settings_.tracker.recently_lost_frames;
+  const auto found = relocaliser_.find(map_, *frame.view, similar, search_all);
   times_.relocalise += watch.seconds();
   if (!found) return false;
   frame.T_camera_world = found->T_camera_world;
   frame.landmarks = found->landmarks;
-  // A wrong place must not be taken for the right one: the local map has to confirm it twice as strongly.
-  return refine_with_local_map(frame, found->place) && frame.inliers >= 2 * settings_.tracker.min_inliers;
+  // A wrong relocalisation would corrupt the map: the local map must give twice the usual inliers.
+  return refine_with_local_map(frame, found->matched_keyframe) &&
+         frame.inliers >= 2 * settings_.tracker.min_inliers;
 }
 
-void Tracker::count_predictions(const TrackedFrame& frame) {
+void Tracker::count_found(const TrackedFrame& frame) {
   for (const LandmarkId id : frame.landmarks) {
     if (!id.is_valid()) continue;
     Landmark& landmark = *map_.find(id);
-    ++landmark.found;
-    landmark.predicted = std::max(landmark.predicted, landmark.found);
+    ++landmark.times_found;
+    landmark.times_visible = std::max(landmark.times_visible, landmark.times_found);
   }
 }
 
 void Tracker::remember(const TrackedFrame& frame) {
   const double elapsed = frame.timestamp - last_.timestamp;
-  constexpr double kMaxGap = 0.5;  // seconds; after a longer gap the old motion tells nothing
-  const bool is_same_world =
-      last_.reference.is_valid() && map_.world_of(last_.reference) == map_.world_of(frame.reference);
-  if (is_same_world && elapsed > 0.0 && elapsed < kMaxGap) {
+  constexpr double kMaxGap = 0.5;  // seconds; after a longer gap the velocity is of no use
+  const bool is_same_submap =
+      last_.reference.is_valid() && map_.submap_of(last_.reference) == map_.submap_of(frame.reference);
+  if (is_same_submap && elapsed > 0.0 && elapsed < kMaxGap) {
     velocity_ = (*frame.T_camera_world * last_pose()->inverse()).log() / elapsed;
   } else {
     velocity_.reset();
@@ -372,11 +372,16 @@ void Tracker::remember(const TrackedFrame& frame) {
   T_last_reference_ = *frame.T_camera_world * map_.T_camera_world(frame.reference).inverse();
 }
 
-void Tracker::promoted(KeyframeId id) {
+void Tracker::keyframe_created(KeyframeId id) {
   const Keyframe& keyframe = *map_.find(id);
   last_.reference = id;
   last_.landmarks = keyframe.landmarks;
   T_last_reference_ = SE3();
+}
+
+void Tracker::restart_clock(double timestamp) {
+  velocity_.reset();
+  last_.timestamp = timestamp;
 }
 
 }  // namespace roslam

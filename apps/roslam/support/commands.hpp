@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace roslam::app {
+
+// Each adds one subcommand. Its callback does the work and throws roslam::Error on bad input.
+void add_run_command(CLI::App& program, const std::string& version);
+void add_simulate_command(CLI::App& program);
+void add_compose_command(CLI::App& program);
+void add_restore_command(CLI::App& program, const std::string& version);
+void add_render_command(CLI::App& program);
+void add_segment_command(CLI::App& program);
+void add_evaluate_command(CLI::App& program);
+void add_map_command(CLI::App& program);
+void add_vocabulary_command(CLI::App& program);
+void add_benchmark_command(CLI::App& program, const std::string& version);
+
+}  // namespace roslam::app

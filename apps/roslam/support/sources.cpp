@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/support/sources.hpp"
+
+#include <iomanip>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "roslam/common/error.hpp"
+#include "simulation/simulated_source.hpp"
+
+namespace roslam::app {
+
+using namespace simulation;
+
+namespace {
+constexpr std::string_view kSimulated = "simulated:";
+
+// Lists the options of a simulated flight once, for both writing and reading.
+template <typename Arguments, typename Visitor>
+void for_each_flight_option(Arguments& arguments, const Visitor& visit) {
+  visit("traffic", arguments.traffic);
+  visit("frames", arguments.frames);
+  visit("seed", arguments.seed);
+  visit("speed", arguments.speed);
+  visit("altitude", arguments.altitude);
+  visit("aside", arguments.aside);
+  visit("gain", arguments.gain);
+}
+}  // namespace
+
+CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
+  CLI::Option* source = command.add_option("SOURCE", arguments.name,
+                                           "Folder in TUM RGB-D format, or simulated:street, "
+                                           "simulated:loop, simulated:hover, simulated:turn");
+  command.add_option(
+      "--camera", arguments.camera,
+      "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file");
+  return source;
+}
+
+void add_flight_options(CLI::App& command, SourceArguments& arguments) {
+  command.add_option("--traffic", arguments.traffic, "Traffic of a simulated flight: none, light or heavy")
+      ->check(CLI::IsMember({"none", "light", "heavy"}))
+      ->capture_default_str();
+  command.add_option("--frames", arguments.frames, "Number of frames of a simulated flight; 0 = all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command.add_option("--seed", arguments.seed, "Seed of a simulated flight")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command.add_option("--speed", arguments.speed, "Speed of a simulated flight, m/s")->capture_default_str();
+  command
+      .add_option("--altitude", arguments.altitude, "Altitude of a simulated flight, metres above the street")
+      ->capture_default_str();
+  command
+      .add_option("--aside", arguments.aside,
+                  "Offset of a simulated flight to the left of the default path, metres")
+      ->capture_default_str();
+  command.add_option("--gain", arguments.gain, "Factor of the image brightness of a simulated flight")
+      ->capture_default_str();
+}
+
+std::optional<SimulatorOptions> simulated_flight(const SourceArguments& arguments) {
+  if (!arguments.name.starts_with(kSimulated)) return std::nullopt;
+  const auto path = flight_path_from(arguments.name.substr(kSimulated.size()));
+  const auto traffic = traffic_level_from(arguments.traffic);
+  if (!path)
+    throw InputError(arguments.name + ": no such flight; use simulated:street, :loop, :hover or :turn");
+  if (!traffic) throw InputError("--traffic " + arguments.traffic + ": use none, light or heavy");
+  if (!arguments.camera.empty() && arguments.camera != "simulated") {
+    throw InputError("--camera " + arguments.camera +
+                     ": a simulated flight has a camera of its own; leave it out");
+  }
+  SimulatorOptions options;
+  options.path = *path;
+  options.traffic = *traffic;
+  options.frames = arguments.frames;
+  options.seed = arguments.seed;
+  options.speed = arguments.speed;
+  options.altitude = arguments.altitude;
+  options.aside = arguments.aside;
+  options.gain = arguments.gain;
+  return options;
+}
+
+std::map<std::string, std::string> flight_in_words(const SourceArguments& arguments) {
+  if (!arguments.name.starts_with(kSimulated)) return {};
+  std::map<std::string, std::string> words;
+  for_each_flight_option(arguments, [&](const char* name, const auto& value) {
+    std::ostringstream text;
+    text << std::setprecision(std::numeric_limits<double>::max_digits10) << value;
+    words[name] = text.str();
+  });
+  return words;
+}
+
+SourceArguments flight_from_words(const std::string& name, const std::map<std::string, std::string>& words) {
+  SourceArguments arguments;
+  arguments.name = name;
+  for_each_flight_option(arguments, [&](const char* key, auto& value) {
+    const auto found = words.find(key);
+    if (found == words.end()) return;
+    std::istringstream text(found->second);
+    const bool is_number = (text >> value) && text.peek() == std::istringstream::traits_type::eof();
+    const bool is_negative =
+        std::is_unsigned_v<std::decay_t<decltype(value)>> && found->second.starts_with('-');
+    if (!is_number || is_negative)
+      throw InputError(name + ": " + key + " of the flight is not a number: " + found->second);
+  });
+  return arguments;
+}
+
+std::shared_ptr<const Vocabulary> load_vocabulary(const std::string& file) {
+  const std::filesystem::path path = file.empty() ? find_vocabulary() : std::filesystem::path(file);
+  return path.empty() ? nullptr : std::make_shared<const Vocabulary>(Vocabulary::load(path));
+}
+
+std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments) {
+  if (arguments.camera.empty()) {
+    throw InputError(arguments.name +
+                     ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a file");
+  }
+  if (arguments.frames != 0) {
+    throw InputError("--frames " + std::to_string(arguments.frames) +
+                     ": is for a simulated flight only; leave it out with a recording");
+  }
+  return std::make_unique<TumSource>(arguments.name, load_camera(arguments.camera));
+}
+
+std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
+  if (const auto flight = simulated_flight(arguments)) return std::make_unique<SimulatedSource>(*flight);
+  return open_recording(arguments);
+}
+
+}  // namespace roslam::app

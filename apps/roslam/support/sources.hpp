@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "roslam/place_recognition/vocabulary.hpp"
+#include "roslam/sensors/frame_source.hpp"
+#include "roslam/sensors/tum_source.hpp"
+#include "simulation/simulated_options.hpp"
+
+namespace roslam::app {
+
+struct SourceArguments {
+  std::string name;               ///< a TUM folder or simulated:street|loop|hover|turn
+  std::string camera;             ///< a preset or a file; not needed for a simulated flight
+  std::string traffic = "light";  ///< the rest: of a simulated flight; none, light, heavy
+  std::size_t frames = 0;         ///< 0 = the whole flight
+  std::uint32_t seed = 1;
+  double speed = 1.0;     ///< m/s
+  double altitude = 3.5;  ///< metres above the street
+  double aside = 0.0;     ///< metres to the left of the default path
+  double gain = 1.0;      ///< factor of the image brightness
+};
+
+/// Adds SOURCE and --camera to a command; returns the option SOURCE.
+CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments);
+
+/// Adds the options of simulated flights: --traffic, --frames, --seed and so on.
+void add_flight_options(CLI::App& command, SourceArguments& arguments);
+
+/// Opens the source. Throws InputError or CalibrationError.
+std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments);
+
+/// The options of a simulated flight as text, by name; empty for a recording.
+std::map<std::string, std::string> flight_in_words(const SourceArguments& arguments);
+
+/// The inverse; an option not in words keeps its default. Throws InputError for a value that is no number.
+SourceArguments flight_from_words(const std::string& name, const std::map<std::string, std::string>& words);
+
+/// Loads a vocabulary, the shipped one if the name is empty; null if there is no shipped one.
+std::shared_ptr<const Vocabulary> load_vocabulary(const std::string& file);
+
+/// The two kinds of sources; the flight is empty for a recording. Both throw as open_source().
+std::optional<simulation::SimulatorOptions> simulated_flight(const SourceArguments& arguments);
+std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments);
+
+}  // namespace roslam::app

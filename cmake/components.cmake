@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Which parts are built: sets ROSLAM_HAS_SEMANTICS, ROSLAM_HAS_DENSE and ROSLAM_HAS_SIMULATION, and writes the version header.
+
+# roslam_component(NAME remedy condition...): whether ROSLAM_<NAME> is built.
+function(roslam_component name remedy)
+  set(wanted ${ROSLAM_${name}})
+  if(NOT wanted MATCHES "^(AUTO|ON|OFF)$")
+    message(FATAL_ERROR "ROSLAM_${name} is '${wanted}'; it must be AUTO, ON or OFF")
+  endif()
+  set(is_found OFF)
+  if(${ARGN})
+    set(is_found ON)
+  endif()
+  if(wanted STREQUAL "ON" AND NOT is_found)
+    message(FATAL_ERROR "ROSLAM_${name} is ON, but a package it needs was not found; install ${remedy}")
+  endif()
+  set(has ${is_found})
+  if(wanted STREQUAL "OFF")
+    set(has OFF)
+  elseif(NOT is_found)
+    message(STATUS "ROSLAM_${name}: not built, install ${remedy} for it")
+  endif()
+  set(ROSLAM_HAS_${name} ${has} PARENT_SCOPE)
+endfunction()
+
+roslam_component(SEMANTICS libopencv-dev "TARGET;opencv_dnn;AND;TARGET;opencv_photo")
+roslam_component(DENSE liboctomap-dev octomap_FOUND)
+roslam_component(SIMULATION libembree-dev embree_FOUND)
+
+foreach(name SEMANTICS DENSE)  # as C++ writes it
+  if(ROSLAM_HAS_${name})
+    set(ROSLAM_CONSTANT_${name} true)
+  else()
+    set(ROSLAM_CONSTANT_${name} false)
+  endif()
+endforeach()
+configure_file(${CMAKE_CURRENT_LIST_DIR}/version.hpp.in ${PROJECT_BINARY_DIR}/generated/roslam/version.hpp @ONLY)

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recording/recorded_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "roslam/common/error.hpp"
+
+namespace roslam::recording {
+
+namespace {
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr double kSameTime = 2e-6;  // seconds; files have six decimals
+
+Camera camera_from(const Json& json) {
+  Camera camera;
+  json.at("width").get_to(camera.width);
+  json.at("height").get_to(camera.height);
+  json.at("fx").get_to(camera.fx);
+  json.at("fy").get_to(camera.fy);
+  json.at("cx").get_to(camera.cx);
+  json.at("cy").get_to(camera.cy);
+  json.at("distortion").get_to(camera.distortion);
+  json.at("depth_units_per_metre").get_to(camera.depth_units_per_metre);
+  json.at("fps").get_to(camera.fps);
+  camera.validate();
+  return camera;
+}
+
+// A run without tracked frames leaves an empty file.
+Trajectory trajectory_of(const fs::path& file) {
+  std::error_code error;
+  if (fs::is_regular_file(file, error) && fs::file_size(file, error) == 0) return {};
+  return read_trajectory(file).trajectory;
+}
+}  // namespace
+
+bool RecordedRun::recognises(const fs::path& folder) {
+  std::error_code error;
+  return fs::is_regular_file(folder / "run.json", error) &&
+         fs::is_regular_file(folder / "trajectory.txt", error);
+}
+
+RecordedRun::RecordedRun(const fs::path& folder)
+    : removal_(folder),
+      trajectory_(trajectory_of(folder / "trajectory.txt")),
+      keyframes_(trajectory_of(folder / "keyframes.txt")) {
+  const fs::path file = folder / "run.json";
+  try {
+    const Json json = Json::parse(std::ifstream(file));
+    json.at("source").get_to(source_);
+    if (json.contains("flight")) json["flight"].get_to(flight_);
+    camera_ = camera_from(json.at("camera"));
+  } catch (const Json::exception&) {
+    throw InputError(file.string() + ": does not name the source and the camera of the run; repeat the run");
+  }
+}
+
+std::optional<SE3> RecordedRun::pose_at(double timestamp) const {
+  const auto later =
+      std::lower_bound(trajectory_.begin(), trajectory_.end(), timestamp - kSameTime,
+                       [](const StampedPose& pose, double time) { return pose.timestamp < time; });
+  if (later == trajectory_.end() || std::abs(later->timestamp - timestamp) > kSameTime) return std::nullopt;
+  return later->T_world_camera;
+}
+
+}  // namespace roslam::recording

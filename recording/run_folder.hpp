@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "recording/removal_record.hpp"
+#include "roslam/sensors/frame_source.hpp"
+#include "roslam/slam/run.hpp"
+#include "roslam/slam/slam.hpp"
+
+namespace roslam::recording {
+
+/// Results of a run: the summary of run() and what was recorded beside it.
+struct RunResults : RunSummary {
+  double start_up_seconds = -1.0;  ///< from the start of the process to the first pose; negative = no pose
+  std::optional<RemovalTally> removal;  ///< what was removed, where a RemovalLog was kept
+  std::optional<DenseMap> dense;        ///< of Slam::dense_map(), if it was called
+};
+
+/// The inputs of a run, for its report.
+struct RunDescription {
+  std::string source;                         ///< as the user named it
+  std::string camera;                         ///< as the user named it
+  std::string version;                        ///< of the program
+  std::string segmentation_model;             ///< weights file of the segmentation network; empty: not used
+  std::string map;                            ///< file of the loaded map; empty: none
+  std::map<std::string, std::string> flight;  ///< options of a simulated flight by name; empty: a recording
+};
+
+/// Writes the results of a run to a folder:
+///   trajectory.txt  poses of all tracked frames (TUM format)
+///   keyframes.txt   poses of the keyframes (TUM format)
+///   map.ply         landmarks with colour
+///   dense.ply       the dense map, points and triangles, if one was built
+///   dense.bt        its free and occupied space, for planners (OctoMap)
+///   map.roslam      the map, for later runs; an old one is kept if there is no new map
+///   trajectory.png  the trajectory from above
+///   groundtruth.txt the true poses, if the source has them (TUM format)
+///   run.json        effective options, counts, times of every stage, memory
+///   report.html     figures and tables: trajectory, errors, times, images
+class RunFolder {
+ public:
+  /// Creates the folder. Throws OutputError, before any work is lost, if it is not writable or is a dataset.
+  explicit RunFolder(const std::filesystem::path& path);
+
+  /// Writes trajectory, keyframes and map, the results that matter most, before those that take longer.
+  /// Throws as write() does.
+  void write_flight(const Slam& slam) const;
+
+  /// Writes all other results, also of a run that was interrupted or failed. Continues after a file that
+  /// cannot be written and throws the first failure as OutputError at the end.
+  void write(const Slam& slam, const RunResults& summary, const FrameSource& source,
+             const RunDescription& description) const;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  enum class Result;
+  struct Output;
+  static Result if_any(bool is_any, Result otherwise);
+  static void write_one(const Output& output, const std::filesystem::path& file);
+  void write_all(const std::vector<Output>& outputs) const;
+
+  std::filesystem::path path_;
+};
+
+/// Frames that the pipeline did not use, by reason in words.
+std::map<std::string, std::size_t> rejected_by_reason(const Slam& slam);
+
+/// The contents of run.json.
+std::string run_report(const Slam& slam, const RunResults& summary, const FrameSource& source,
+                       const RunDescription& description);
+
+/// The contents of report.html. folder: of the run's images.
+std::string run_page(const Slam& slam, const RunResults& summary, const RunDescription& description,
+                     const std::filesystem::path& folder);
+
+}  // namespace roslam::recording

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "recording/process_info.hpp"
+#include "recording/run_folder.hpp"
+#include "roslam/common/failure.hpp"
+
+namespace roslam::recording {
+
+namespace {
+using Json = nlohmann::ordered_json;
+
+double rounded(double value, int decimals) {
+  const double factor = std::pow(10.0, decimals);
+  return std::round(value * factor) / factor;
+}
+
+Json camera_json(const Camera& camera) {
+  return {{"width", camera.width},
+          {"height", camera.height},
+          {"fx", camera.fx},
+          {"fy", camera.fy},
+          {"cx", camera.cx},
+          {"cy", camera.cy},
+          {"distortion", camera.distortion},
+          {"depth_units_per_metre", camera.depth_units_per_metre},
+          {"fps", camera.fps}};
+}
+
+Json counts_json(const std::map<std::string, std::size_t>& counts) {
+  Json json = Json::object();
+  for (const auto& [reason, count] : counts) json[reason] = count;
+  return json;
+}
+
+// in_source = processed + dropped + all skipped, unless the run ended early.
+Json frames_json(const Slam& slam, const RunResults& summary, const FrameSource& source) {
+  std::size_t tracked = 0;
+  Json by_state = Json::object();
+  for (const auto& [state, count] : slam.frames_by_state()) {
+    by_state[std::string(name_of(state))] = count;
+    if (state == TrackingState::kTracking) tracked = count;
+  }
+  std::size_t rejected = 0;
+  Json skipped = counts_json(source.skipped());
+  for (const auto& [reason, count] : rejected_by_reason(slam)) {
+    skipped[reason] = skipped.value(reason, std::size_t{0}) + count;
+    rejected += count;
+  }
+  const std::size_t arrived = slam.frames() + rejected + summary.dropped;
+  return {{"in_source", source.size().value_or(arrived)},
+          {"processed", slam.frames()},
+          {"tracked", tracked},
+          {"tracked_share",
+           slam.frames() == 0 ? 0.0 : static_cast<double>(tracked) / static_cast<double>(slam.frames())},
+          {"dropped", summary.dropped},
+          {"by_state", by_state},
+          {"skipped", skipped},
+          {"clock_resets", slam.clock_resets()},
+          {"without_depth", summary.without_depth},
+          {"skipped_depth", counts_json(source.skipped_depth())}};
+}
+
+Json times_json(const StageTimes& times) {
+  Json json = Json::object();
+  for (const auto& [stage, s] : times.summary()) {
+    json[stage] = {{"count", s.count},
+                   {"mean", rounded(s.mean_ms, 3)},
+                   {"median", rounded(s.median_ms, 3)},
+                   {"p95", rounded(s.p95_ms, 3)},
+                   {"max", rounded(s.max_ms, 3)}};
+  }
+  return json;
+}
+
+// Shares are of all points or pixels of the run, ages in frames.
+Json dynamic_json(const Slam& slam, const RunResults& summary, const RunDescription& description) {
+  Json json{{"mode", mode_of(slam.options().dynamic_objects)},
+            {"model", description.segmentation_model},
+            {"labelling_faults", counts_json(slam.labelling_faults())}};
+  if (!summary.removal) return json;
+  const RemovalTally& tally = *summary.removal;
+  const auto frames = static_cast<double>(std::max<std::size_t>(tally.frames, 1));
+  std::size_t removed = 0;
+  for (const auto& [kind, count] : tally.removed_points) removed += count;
+  const auto points = static_cast<double>(std::max<std::size_t>(tally.kept_points + removed, 1));
+  std::vector<int> ages = tally.label_ages;
+  std::sort(ages.begin(), ages.end());
+  json["removed_area_share"] = rounded(tally.removed_area / frames, 4);
+  json["removed_point_share"] = rounded(static_cast<double>(removed) / points, 4);
+  json["removed_points"] = counts_json(tally.removed_points);
+  json["frames_with_labels"] = ages.size();
+  json["label_age_median"] = ages.empty() ? Json(nullptr) : Json(ages[ages.size() / 2]);
+  json["label_age_max"] = ages.empty() ? Json(nullptr) : Json(ages.back());
+  json["low_quality_frames"] = tally.low_quality;
+  json["predicted_frames"] = tally.predicted;
+  json["masks_dropped"] = tally.masks_dropped;
+  json["lines_dropped"] = tally.lines_dropped;
+  return json;
+}
+
+// Shares are of all points.
+Json dense_json(const DenseMap& dense) {
+  auto points = count_by_provenance(dense.surface);
+  const auto all = static_cast<double>(std::max<std::size_t>(dense.surface.points.size(), 1));
+  const auto share = [&](Provenance provenance) {
+    return rounded(static_cast<double>(points[provenance]) / all, 4);
+  };
+  return {{"points", dense.surface.points.size()},
+          {"triangles", dense.surface.triangles.size()},
+          {"measured_share", share(Provenance::kMeasured)},
+          {"reprojected_share", share(Provenance::kReprojected)},
+          {"inpainted_share", share(Provenance::kInpainted)},
+          {"voxel_size_metres", dense.voxel_size},
+          {"times_coarsened", dense.times_coarsened},
+          {"keyframes", dense.keyframes},
+          {"dropped", dense.dropped},
+          {"fused_anew", dense.moved},
+          {"voxel_megabytes", rounded(static_cast<double>(dense.voxel_bytes) / 1048576.0, 1)},
+          {"view_megabytes", rounded(static_cast<double>(dense.view_bytes) / 1048576.0, 1)},
+          {"faults", counts_json(dense.faults)}};
+}
+
+Json loops_json(const Slam& slam) {
+  Json json{{"closed", Json::array()},
+            {"refused", slam.refused_loops()},
+            {"faults", counts_json(slam.loop_faults())}};
+  for (const auto& loop : slam.loops()) {
+    json["closed"].push_back({{"keyframe", loop.keyframe.value},
+                              {"matched_keyframe", loop.matched_keyframe.value},
+                              {"moved_metres", rounded(loop.moved, 4)},
+                              {"turned_degrees", rounded(loop.turned * 180.0 / M_PI, 3)},
+                              {"matches", loop.matches},
+                              {"merges_submaps", loop.merges_submaps}});
+  }
+  return json;
+}
+
+Json map_json(const Slam& slam, const RunDescription& description) {
+  std::size_t in_other_submaps = 0;
+  for (const auto& [submap, frames] : slam.frames_in_other_submaps()) in_other_submaps += frames;
+  return {{"from", description.map.empty() ? Json(nullptr) : Json(description.map)},
+          {"recognised", description.map.empty() ? Json(nullptr) : Json(slam.found_in_loaded_map())},
+          {"localise_only", !slam.options().keyframes.enabled},
+          {"submaps", slam.map().submaps().size()},
+          {"frames_in_other_submaps", in_other_submaps}};
+}
+
+double path_length(const Trajectory& trajectory) {
+  double length = 0.0;
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    length +=
+        (trajectory[i].T_world_camera.translation() - trajectory[i - 1].T_world_camera.translation()).norm();
+  }
+  return length;
+}
+}  // namespace
+
+std::string run_report(const Slam& slam, const RunResults& summary, const FrameSource& source,
+                       const RunDescription& description) {
+  const double per_second =
+      summary.wall_seconds > 0.0 ? static_cast<double>(slam.frames()) / summary.wall_seconds : 0.0;
+  Json json;
+  json["version"] = description.version;
+  json["source"] = description.source;
+  if (!description.flight.empty()) json["flight"] = description.flight;
+  json["mode"] = slam.mode() == Mode::kDeterministic ? "deterministic" : "real-time";
+  json["interrupted"] = summary.interrupted;
+  json["error"] = summary.failure ? Json(message_of(summary.failure)) : Json(nullptr);
+  json["frames"] = frames_json(slam, summary, source);
+  json["dynamic"] = dynamic_json(slam, summary, description);
+  if (slam.restores())
+    json["restoration"] = {{"dropped", slam.unrestored()},
+                           {"faults", counts_json(slam.restoration_faults())}};
+  if (summary.dense) json["dense"] = dense_json(*summary.dense);
+  json["loops"] = loops_json(slam);
+  json["map"] = map_json(slam, description);
+  json["keyframes"] = slam.map().keyframe_count();
+  json["landmarks"] = slam.map().landmark_count();
+  json["path_length_metres"] = rounded(path_length(slam.trajectory()), 3);
+  json["wall_seconds"] = rounded(summary.wall_seconds, 3);
+  json["frames_per_second"] = rounded(per_second, 2);
+  json["first_pose_seconds"] = rounded(summary.first_pose_seconds, 3);
+  json["start_up_seconds"] = rounded(summary.start_up_seconds, 2);
+  json["peak_memory_megabytes"] = rounded(static_cast<double>(peak_memory()) / 1048576.0, 1);
+  json["processor_milliseconds"] = times_json(slam.times());
+  json["camera"] = camera_json(slam.camera());
+  json["camera"]["name"] = description.camera;
+  json["options"] = Json::parse(options_to_json(slam.options()));
+  // Bytes of file names that are not valid UTF-8 are replaced rather than refused.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace roslam::recording

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "roslam/dense/dense_options.hpp"
+#include "roslam/dense/depth_keyframe.hpp"
+#include "roslam/dense/surface_map.hpp"
+#include "roslam/dense/tsdf_volume.hpp"
+#include "roslam/geometry/se3.hpp"
+#include "roslam/map/ids.hpp"
+#include "roslam/map/keyframe_pose.hpp"
+
+namespace roslam {
+
+/// Fuses keyframes into a TSDF volume for each submap and follows pose corrections: blocks affected by moved
+/// keyframes are erased and re-integrated, so that the map equals one fused at the corrected poses. Not
+/// thread-safe.
+class DenseMapper {
+ public:
+  /// Throws OptionsError.
+  DenseMapper(const DenseOptions& options, const MeasurementNoise& noise);
+
+  /// Fuses a keyframe that was not inserted before. Ignored if it has no depth or its pose is not finite.
+  void insert(KeyframeId id, const DepthKeyframe& keyframe, const KeyframePose& pose);
+
+  /// Re-integrates keyframes at their corrected poses. Those that moved by less than share times
+  /// DenseOptions::follow voxels stay. Returns the number of moved keyframes.
+  std::size_t follow(const std::map<KeyframeId, KeyframePose>& poses, double share = 1.0);
+
+  /// Ids of the fused keyframes, ascending.
+  std::vector<KeyframeId> keyframes() const;
+
+  /// Null if the submap has no fused keyframes.
+  const TsdfVolume* map(SubmapId submap) const;
+
+  /// The surface of a submap, without points that fail the VisibilityCheck. Empty if nothing was fused.
+  SurfaceMap surface(SubmapId submap) const;
+
+  /// The same; nothing if should_stop, which is polled once a keyframe, became true.
+  std::optional<SurfaceMap> surface(SubmapId submap, const std::function<bool()>& should_stop) const;
+
+  /// Visits the fused keyframes of a submap in the order of their ids, with the poses they were fused at.
+  void visit(SubmapId submap,
+             const std::function<void(const DepthKeyframe&, const SE3& T_world_camera)>& visitor) const;
+
+  double voxel_size() const { return voxel_size_; }       ///< metres; 0 before the first keyframe
+  std::size_t voxel_bytes() const;                        ///< of all submaps
+  std::size_t view_bytes() const { return view_bytes_; }  ///< of keyframes kept for re-integration
+  int times_coarsened() const { return times_coarsened_; }
+
+ private:
+  struct Fused {
+    PackedDepthKeyframe keyframe;
+    KeyframePose pose;  // at which it was fused
+    double depth;       // metres, median of the keyframe
+  };
+
+  TsdfVolume& map_of(SubmapId submap);
+  bool has_moved(const Fused& fused, const KeyframePose& pose, double share) const;
+  void reintegrate(SubmapId submap, const BlockSet& blocks);
+  bool is_in_reach(const Fused& fused, const TsdfVolume& map, const BlockSet& blocks) const;
+  void limit_memory();
+
+  DenseOptions options_;
+  MeasurementNoise noise_;
+  double voxel_size_;
+  std::map<KeyframeId, Fused> fused_;
+  std::map<SubmapId, TsdfVolume> maps_;
+  std::size_t view_bytes_ = 0;
+  int times_coarsened_ = 0;
+};
+
+}  // namespace roslam

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/dynamic_objects/dynamic_object_detector.hpp"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "roslam/dynamic_objects/mask_growth.hpp"
+#include "roslam/dynamic_objects/mask_refinement.hpp"
+#include "roslam/dynamic_objects/object_evidence.hpp"
+
+namespace roslam {
+
+namespace {
+constexpr double kPastKept = 0.6;  // seconds of past frames kept, from which late labels can be propagated
+
+std::optional<std::size_t> position_of(int id, const std::vector<int>& ids) {
+  const auto found = std::find(ids.begin(), ids.end(), id);
+  if (found == ids.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - ids.begin());
+}
+
+// Whether a labelled object is removed: one of low confidence only if it lasts and does not seem at rest.
+bool is_removable(const MovableObject& object, bool is_confident, const ObjectEvidence& evidence,
+                  const DynamicObjectOptions& options) {
+  constexpr int kMinSeen = 3;  // labels that must show an object of low confidence, as noise does not last
+  if (is_confident && !options.keep_resting) return true;
+  return (is_confident || object.times_seen >= kMinSeen) && !seems_at_rest(evidence, options);
+}
+}  // namespace
+
+cv::Mat removed_area(const DynamicObjects& dynamic_objects, const cv::Size& image, int margin) {
+  if (dynamic_objects.objects.empty()) return {};
+  cv::Mat mask = cv::Mat::zeros(image, CV_8UC1);
+  for (const MovableObject& object : dynamic_objects.objects) draw_object(object, mask);
+  return dilated(mask, margin);
+}
+
+DynamicObjectDetector::DynamicObjectDetector(const Camera& camera, const Settings& settings)
+    : camera_(camera),
+      settings_(settings),
+      grid_(camera),
+      flow_(camera, settings.dynamic_objects, settings.depth, settings.noise, settings.pose),
+      history_(settings.dynamic_objects, settings.noise),
+      object_tracker_(settings.dynamic_objects) {
+  settings.dynamic_objects.validate();
+}
+
+DynamicObjects DynamicObjectDetector::detect(const Frame& frame, const cv::Mat& grey,
+                                             const std::optional<SE3>& predicted_T_camera_world,
+                                             const std::optional<LabelledFrame>& labels) {
+  const DynamicObjectOptions& options = settings_.dynamic_objects;
+  begin_frame(frame, grey, predicted_T_camera_world);
+  if (!options.carry) object_tracker_.clear();
+  if (!past_.empty()) object_tracker_.carry(past_.back(), current_, flow_);
+  CellScene scene = gather_evidence();
+  const std::vector<MovableObject> propagated = object_tracker_.objects();
+  if (options.labels && labels) {
+    if (auto objects = labelled_objects(*labels)) {
+      labelled_index_ = labels->index;
+      object_tracker_.update_labelled(std::move(*objects), current_.timestamp);
+    }
+  }
+  assign_cells(scene, object_tracker_.objects(), propagated, grid_, options);
+  assess_objects(scene);
+  if (options.depth_consistency && !history_.empty()) {
+    const cv::Mat barrier = scene.cells_that_are(MotionEvidence::kStatic);
+    grow_masks(scene.owners, {depth_cells_, barrier, scene.seeds, scene.moving}, grid_, options.growth);
+  }
+  if (options.depth_consistency || options.flow) add_unlabelled(scene);
+  return compose_masks(scene);
+}
+
+void DynamicObjectDetector::begin_frame(const Frame& frame, const cv::Mat& grey,
+                                        const std::optional<SE3>& predicted_T_camera_world) {
+  current_ = {frame.index, frame.timestamp, flow_pyramid(grey), frame.depth, predicted_T_camera_world, {},
+              {}};
+  depth_cells_ = grid_.depth_cells(frame.depth, settings_.depth);
+  pose_from_flow_.reset();
+  if (predicted_T_camera_world && !past_.empty()) {
+    pose_from_flow_ = flow_.camera_pose(past_.back(), current_, *predicted_T_camera_world);
+    if (pose_from_flow_) current_.T_camera_world = pose_from_flow_;
+  }
+}
+
+CellScene DynamicObjectDetector::gather_evidence() const {
+  const DynamicObjectOptions& options = settings_.dynamic_objects;
+  CellScene scene;
+  scene.depth = depth_cells_;
+  if (options.depth_consistency && current_.T_camera_world) {
+    scene.depth_evidence =
+        history_.examine(grid_, depth_cells_, *current_.T_camera_world, current_.timestamp);
+  } else {
+    scene.depth_evidence = {cv::Mat::zeros(grid_.size(), CV_8UC1), cv::Mat::zeros(grid_.size(), CV_32FC1)};
+  }
+  if (const PastFrame* past = options.flow ? flow_reference() : nullptr) {
+    scene.flow = flow_.follow(*past, current_);
+    reject_contradicted_motion(scene);
+  }
+  scene.moving = scene.cells_that_are(MotionEvidence::kMoving);
+  for (const auto& point : flow_.in_company(scene.flow)) {
+    cv::circle(scene.moving, grid_.cell_of(point), 1, 255, cv::FILLED);
+  }
+  scene.owners = cv::Mat::zeros(grid_.size(), CV_32SC1);
+  scene.seeds = scene.moving.clone();
+  return scene;
+}
+
+// A wrong pose or depth makes static regions appear moving in depth consistency; tracked points on them that
+// are at rest reject these.
+void DynamicObjectDetector::reject_contradicted_motion(CellScene& scene) const {
+  cv::Mat numbers;
+  const int count =
+      cv::connectedComponents(scene.cells_that_are(MotionEvidence::kMoving), numbers, 8, CV_32S);
+  const auto evidence = evidence_by_owner(numbers, static_cast<std::size_t>(count), scene.depth_evidence,
+                                          scene.flow, grid_, settings_.dynamic_objects);
+  for (int n = 1; n < count; ++n) {
+    if (!contradicts_motion(evidence[static_cast<std::size_t>(n)])) continue;
+    scene.depth_evidence.state.setTo(static_cast<int>(MotionEvidence::kUnknown), numbers == n);
+  }
+}
+
+const PastFrame* DynamicObjectDetector::past_frame(std::size_t index) const {
+  const auto found =
+      std::find_if(past_.begin(), past_.end(), [&](const auto& p) { return p.index == index; });
+  return found == past_.end() ? nullptr : &*found;
+}
+
+// The frame that points are tracked from: old enough for motion to be measurable.
+const PastFrame* DynamicObjectDetector::flow_reference() const {
+  const PastFrame* best = nullptr;
+  for (const PastFrame& past : past_) {
+    if (best == nullptr || current_.timestamp - past.timestamp >= settings_.dynamic_objects.flow_interval)
+      best = &past;
+  }
+  return best;
+}
+
+// The labelled objects, propagated to the current frame; nothing if the labels cannot be used.
+std::optional<std::vector<MovableObject>> DynamicObjectDetector::labelled_objects(
+    const LabelledFrame& labels) {
+  const cv::Mat& image = labels.segmentation.labels;
+  if (image.type() != CV_8UC1 || image.size() != cv::Size(camera_.width, camera_.height)) {
+    ++faults_["labels have another size than the image"];
+    return std::nullopt;
+  }
+  const double movable = cv::countNonZero(movable_mask(image));
+  if (movable > settings_.dynamic_objects.max_labelled_share * static_cast<double>(image.total())) {
+    ++faults_["nearly everything is labelled as movable"];
+    return std::nullopt;
+  }
+  const double least = settings_.dynamic_objects.min_object_share;
+  if (labels.index == current_.index) return find_objects(labels.segmentation, depth_cells_, grid_, least);
+  const PastFrame* past = settings_.dynamic_objects.carry ? past_frame(labels.index) : nullptr;
+  if (past == nullptr) {
+    ++faults_["labels came too late"];
+    return std::nullopt;
+  }
+  const cv::Mat depth = grid_.depth_cells(past->depth, settings_.depth);
+  return predicted_objects(find_objects(labels.segmentation, depth, grid_, least), *past, current_, flow_);
+}
+
+// Decides which objects are at rest and which are confirmed; the cells of unconfirmed ones are released.
+void DynamicObjectDetector::assess_objects(CellScene& scene) {
+  const DynamicObjectOptions& options = settings_.dynamic_objects;
+  if (!options.depth_consistency && !options.flow) return;
+  auto& objects = object_tracker_.objects();
+  const auto evidence =
+      evidence_by_owner(scene.owners, objects.size(), scene.depth_evidence, scene.flow, grid_, options);
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    MovableObject& object = objects[i];
+    const int number = static_cast<int>(i) + 1;
+    const bool is_confident = object.kind != Movable::kUnknown &&
+                              static_cast<double>(object.decayed_confidence) >= options.min_confidence;
+    object.is_at_rest = is_confident && has_rested(evidence[i + 1], options);
+    object.is_confirmed = object.kind == Movable::kUnknown
+                              ? !contradicts_motion(evidence[i + 1])
+                              : is_removable(object, is_confident, evidence[i + 1], options);
+    if (!object.is_confirmed) scene.owners.setTo(0, scene.owners == number);
+    // New unlabelled objects are only sought in cells without an owner: known ones are updated here.
+    constexpr int kMinCells = 4;  // cells: one or two may be noise
+    if (object.kind == Movable::kUnknown && object.is_confirmed &&
+        cv::countNonZero(scene.moving & (scene.owners == number)) >= kMinCells) {
+      object.last_seen = current_.timestamp;
+      object.misses = 0;
+    }
+  }
+}
+
+// Creates unlabelled objects from moving cells without an owner.
+void DynamicObjectDetector::add_unlabelled(CellScene& scene) {
+  const DynamicObjectOptions& options = settings_.dynamic_objects;
+  const cv::Mat seeds = scene.moving & (scene.owners == 0);
+  cv::Mat joined;
+  cv::dilate(seeds, joined, cv::Mat());
+  cv::Mat numbers;
+  const int count = cv::connectedComponents(joined, numbers, 4, CV_32S);
+  numbers.setTo(0, seeds == 0);
+  const cv::Mat barrier = scene.cells_that_are(MotionEvidence::kStatic) | (scene.owners != 0);
+  grow_masks(numbers, {depth_cells_, barrier, seeds, scene.moving}, grid_, options.growth);
+  const auto evidence = evidence_by_owner(numbers, static_cast<std::size_t>(count), scene.depth_evidence,
+                                          scene.flow, grid_, options);
+  const double least = std::max(8.0, options.min_object_share * static_cast<double>(grid_.cells()));
+  std::vector<MovableObject> found;
+  std::vector<int> found_numbers;
+  for (int n = 1; n < count; ++n) {
+    const auto& e = evidence[static_cast<std::size_t>(n)];
+    if (e.cells < least || contradicts_motion(e)) continue;
+    MovableObject object;
+    object.kind = Movable::kUnknown;
+    if (!take_mask(object, grid_.in_pixels(numbers == n))) continue;
+    object.median_depth = median_depth(object, depth_cells_, grid_);
+    found.push_back(std::move(object));
+    found_numbers.push_back(n);
+  }
+  std::vector<int> old_ids;
+  for (const auto& object : object_tracker_.objects()) old_ids.push_back(object.id);
+  const std::vector<int> found_ids = object_tracker_.update_unlabelled(std::move(found), current_.timestamp);
+  // The update has changed the order of the objects.
+  cv::Mat owners = cv::Mat::zeros(grid_.size(), CV_32SC1);
+  const auto& objects = object_tracker_.objects();
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const int number = static_cast<int>(i) + 1;
+    if (const auto old = position_of(objects[i].id, old_ids)) {
+      owners.setTo(number, scene.owners == static_cast<int>(*old) + 1);
+    }
+    const auto now = position_of(objects[i].id, found_ids);
+    if (now && is_seen_repeatedly(objects[i])) owners.setTo(number, numbers == found_numbers[*now]);
+  }
+  scene.owners = owners;
+}
+
+DynamicObjects DynamicObjectDetector::compose_masks(const CellScene& scene) {
+  DynamicObjects dynamic_objects;
+  dynamic_objects.T_camera_world = pose_from_flow_;
+  dynamic_objects.label_age = labelled_index_ ? static_cast<int>(current_.index - *labelled_index_) : -1;
+  auto& objects = object_tracker_.objects();
+  if (objects.empty()) return dynamic_objects;
+  const cv::Mat owners = owners_of_pixels(scene, objects, current_.depth, grid_, settings_.dynamic_objects);
+  const cv::Mat mask = owners != 0;
+  cv::Mat resting = cv::Mat::zeros(mask.size(), CV_8UC1);
+  std::vector<MovableObject> kept;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    MovableObject& object = objects[i];
+    if (!take_mask(object, owners == static_cast<int>(i) + 1)) {
+      // Not in this mask, but it may be in the next.
+      if (!object.is_confirmed || object.kind == Movable::kUnknown) kept.push_back(object);
+      continue;
+    }
+    object.median_depth = median_depth(object, depth_cells_, grid_);
+    if (object.is_at_rest) draw_object(object, resting);
+    kept.push_back(object);
+    dynamic_objects.objects.push_back(object);
+  }
+  objects = kept;
+  if (cv::countNonZero(mask) == 0) return dynamic_objects;
+  const int margin = settings_.dynamic_objects.margin;
+  dynamic_objects.mask = dilated(mask, margin);
+  // Without what lies within the margin of another object.
+  if (cv::countNonZero(resting) > 0) dynamic_objects.resting = dilated_apart(resting, mask, margin);
+  return dynamic_objects;
+}
+
+void DynamicObjectDetector::apply_correction(const SE3& T_new_old) {
+  for (auto& past : past_) {
+    if (past.T_camera_world) past.T_camera_world = *past.T_camera_world * T_new_old.inverse();
+  }
+  history_.apply_correction(T_new_old);
+}
+
+void DynamicObjectDetector::leave_submap() {
+  for (auto& past : past_) past.T_camera_world.reset();
+  history_.clear();
+}
+
+void DynamicObjectDetector::reset() {
+  past_.clear();
+  history_.clear();
+  object_tracker_.clear();
+}
+
+void DynamicObjectDetector::remember(const std::optional<SE3>& T_camera_world,
+                                     std::vector<cv::Point2f> points,
+                                     std::vector<cv::Point2f> removed_points) {
+  current_.T_camera_world = T_camera_world;
+  current_.points = std::move(points);
+  current_.moving_points = std::move(removed_points);
+  if (T_camera_world && settings_.dynamic_objects.depth_consistency) {
+    history_.add(depth_cells_, *T_camera_world, current_.timestamp);
+  }
+  while (!past_.empty() && current_.timestamp - past_.front().timestamp > kPastKept) past_.pop_front();
+  past_.push_back(std::move(current_));
+  current_ = {};
+}
+
+}  // namespace roslam

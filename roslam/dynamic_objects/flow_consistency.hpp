@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "roslam/dynamic_objects/dynamic_object_options.hpp"
+#include "roslam/dynamic_objects/optical_flow.hpp"
+#include "roslam/estimation/pose_optimiser.hpp"
+#include "roslam/features/observed_frame.hpp"
+#include "roslam/geometry/camera.hpp"
+
+namespace roslam {
+
+/// Points tracked from an earlier frame; pixels of the current image as taken (distorted).
+struct TrackedPoints {
+  std::vector<cv::Point2f> at_rest;
+  std::vector<cv::Point2f> moving;
+  double sigma = 0.0;  ///< pixels; residual of static points (blur, pose error, rolling shutter)
+};
+
+/// Sparse optical flow of a frame: the motion of the camera, and the points that do not move with the static
+/// scene.
+class FlowConsistency {
+ public:
+  FlowConsistency(const Camera& camera, const DynamicObjectOptions& options, const DepthOptions& depth,
+                  const MeasurementNoise& noise, const PoseOptimiserOptions& pose)
+      : camera_(camera), options_(options), depth_(depth), noise_(noise), pose_(pose) {}
+
+  /// T_camera_world of the current frame by the flow of the last frame's static points; nothing if too few
+  /// agree.
+  std::optional<SE3> camera_pose(const PastFrame& last, const PastFrame& current,
+                                 const SE3& predicted_T_camera_world) const;
+
+  /// Tracks points from a past frame and classifies them. A point moves if it differs by more than the noise
+  /// of pixels, depth and pose from its reprojection by its depth in the past frame, or, if that is unknown,
+  /// from its epipolar line. Empty if a pose is unknown.
+  TrackedPoints follow(const PastFrame& past, const PastFrame& current) const;
+
+  /// The moving points with others nearby, since single ones may be outliers.
+  std::vector<cv::Point2f> in_company(const TrackedPoints& followed) const;
+
+  /// Where a static point of the past frame is predicted in the current one; the same pixel if a pose is
+  /// unknown.
+  cv::Point2f expected(const PastFrame& past, const PastFrame& current, const cv::Point2f& point) const;
+
+ private:
+  double residual(const Eigen::Vector2d& from, float depth, const Eigen::Vector2d& to,
+                  const SE3& T_current_past, double pixel_sigma) const;
+
+  Camera camera_;
+  DynamicObjectOptions options_;
+  DepthOptions depth_;
+  MeasurementNoise noise_;
+  PoseOptimiserOptions pose_;
+};
+
+}  // namespace roslam

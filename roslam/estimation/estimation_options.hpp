@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "roslam/common/export.hpp"
+
+namespace roslam {
+
+/// Noise model of measured points.
+struct ROSLAM_EXPORT MeasurementNoise {
+  double pixel_sigma = 1.5;    ///< pixels at the finest pyramid level; grows with the level's scale
+  double depth_sigma = 0.005;  ///< metres, the part independent of distance
+  double depth_sigma_growth =
+      0.004;  ///< 1/metre: depth noise grows with the square of the distance (Khoshelham 2012)
+
+  /// Squared errors above the chi-squared limit are down-weighted (Huber); above this many times the limit
+  /// they are outliers. Rejection at the limit itself would drop measurements that bundle adjustment can
+  /// still fit by moving the landmark.
+  double outlier_factor = 4.0;
+
+  double sigma_of_depth(double depth) const { return depth_sigma + depth_sigma_growth * depth * depth; }
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+};
+
+struct ROSLAM_EXPORT PoseOptimiserOptions {
+  int rounds = 4;      ///< each reclassifies inliers and outliers at its end
+  int iterations = 8;  ///< Gauss-Newton (Levenberg-Marquardt where needed) steps per round, at most
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+};
+
+}  // namespace roslam

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/estimation/pose_optimiser.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "roslam/common/error.hpp"
+
+namespace roslam {
+
+namespace {
+constexpr double kMinDepth = 1e-3;  // metres; points nearer than that or behind the camera are not seen
+// A step below both ends the iterations.
+constexpr double kSmallTranslation = 1e-7;  // metres
+constexpr double kSmallRotation = 1e-7;     // radians
+
+using Measurements = std::vector<PoseMeasurement>;
+
+struct NormalEquations {
+  Matrix6d hessian = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  double cost = 0.0;  // sum of squared errors, those beyond the chi-squared limit after Huber if robust
+};
+
+double huber(double squared, double limit) {
+  return squared <= limit ? squared : 2.0 * std::sqrt(limit * squared) - limit;
+}
+
+// Adds one measurement; T_camera_world is perturbed from the left.
+void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, bool robust,
+         NormalEquations& system) {
+  const double limit = chi_squared_limit(term.measurement);
+  if (point_camera.z() <= kMinDepth) {
+    // No pose is better for moving a point behind the camera: it costs what an outlier does.
+    const double most = outlier_limit(term.measurement);
+    system.cost += robust ? huber(most, limit) : most;
+    return;
+  }
+  const Eigen::Vector3d error = term.error(point_camera);
+  const Eigen::Matrix3d by_point = term.jacobian(point_camera);
+  Eigen::Matrix<double, 3, 6> jacobian;
+  jacobian.leftCols<3>() = by_point;
+  jacobian.rightCols<3>() = -by_point * skew(point_camera);
+  const double squared = error.squaredNorm();
+  const double weight = robust && squared > limit ? std::sqrt(limit / squared) : 1.0;
+  system.hessian.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose(), weight);
+  system.gradient.noalias() += weight * jacobian.transpose() * error;
+  system.cost += robust ? huber(squared, limit) : squared;
+}
+
+NormalEquations linearise(const Camera& camera, const Measurements& measurements, const OptimisedPose& pose,
+                          bool robust) {
+  NormalEquations system;
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    if (!pose.is_inlier[i]) continue;
+    add({camera, measurements[i].measurement}, pose.T_camera_world * measurements[i].point_world, robust,
+        system);
+  }
+  system.hessian.diagonal().array() += 1e-9;  // keeps a degenerate system solvable
+  return system;
+}
+
+// Gauss-Newton on the inliers. A step that raises the cost is taken back and tried again with damping
+// (Levenberg-Marquardt). False if the system cannot be solved.
+bool minimise(const Camera& camera, const Measurements& measurements, bool robust, int iterations,
+              OptimisedPose& pose) {
+  constexpr double kFirstDamping = 1e-3;
+  constexpr double kRounding = 1e-9;  // share of the cost that rounding may raise it by
+  NormalEquations system = linearise(camera, measurements, pose, robust);
+  double damping = 0.0;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    Matrix6d hessian = system.hessian;
+    if (damping > 0.0) hessian.diagonal() *= 1.0 + damping;
+    const Vector6d step = -hessian.selfadjointView<Eigen::Lower>().ldlt().solve(system.gradient);
+    if (!step.allFinite()) return false;
+    const SE3 before = pose.T_camera_world;
+    pose.T_camera_world = SE3::exp(step) * before;
+    if (step.head<3>().norm() < kSmallTranslation && step.tail<3>().norm() < kSmallRotation) break;
+    const NormalEquations next = linearise(camera, measurements, pose, robust);
+    if (next.cost <= system.cost * (1.0 + kRounding)) {
+      system = next;
+      damping *= 0.1;
+      if (damping < kFirstDamping) damping = 0.0;
+    } else {
+      pose.T_camera_world = before;
+      damping = damping > 0.0 ? 10.0 * damping : kFirstDamping;
+    }
+  }
+  return true;
+}
+
+void classify(const Camera& camera, const Measurements& measurements, OptimisedPose& pose) {
+  pose.inliers = 0;
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    const Eigen::Vector3d point = pose.T_camera_world * measurements[i].point_world;
+    const ReprojectionError term{camera, measurements[i].measurement};
+    pose.is_inlier[i] = point.z() > kMinDepth &&
+                        term.error(point).squaredNorm() <= outlier_limit(measurements[i].measurement);
+    pose.inliers += pose.is_inlier[i] ? 1 : 0;
+  }
+}
+}  // namespace
+
+void PoseOptimiserOptions::validate() const {
+  if (rounds < 1 || rounds > 100) throw OptionsError("pose.rounds must be 1 to 100");
+  if (iterations < 1 || iterations > 100) throw OptionsError("pose.iterations must be 1 to 100");
+}
+
+OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurement>& measurements,
+                            const SE3& initial_T_camera_world, const PoseOptimiserOptions& options) {
+  const OptimisedPose failed{initial_T_camera_world, std::vector<bool>(measurements.size(), false), 0};
+  OptimisedPose result{initial_T_camera_world, std::vector<bool>(measurements.size(), true),
+                       static_cast<int>(measurements.size())};
+  for (int round = 0; round < options.rounds && result.inliers >= 3; ++round) {
+    const bool robust = round < options.rounds - 1;
+    if (!minimise(camera, measurements, robust, options.iterations, result)) return failed;
+    classify(camera, measurements, result);
+  }
+  return result.inliers < 3 || !result.T_camera_world.is_finite() ? failed : result;
+}
+
+}  // namespace roslam

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "roslam/estimation/estimation_options.hpp"
+#include "roslam/estimation/measurement_model.hpp"
+#include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/se3.hpp"
+
+namespace roslam {
+
+/// A known point and its measurement in the frame.
+struct PoseMeasurement {
+  Eigen::Vector3d point_world = Eigen::Vector3d::Zero();  ///< metres
+  Measurement measurement;
+};
+
+struct OptimisedPose {
+  SE3 T_camera_world;
+  std::vector<bool> is_inlier;  ///< one per measurement
+  int inliers = 0;
+};
+
+/// The camera pose that fits the measurements best: Gauss-Newton on reprojection and inverse depth errors,
+/// with Huber weights in all rounds but the last. After each round, measurements above outlier_limit are
+/// excluded; they may become inliers again later. With fewer than three inliers the initial pose is returned,
+/// without inliers.
+OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurement>& measurements,
+                            const SE3& initial_T_camera_world, const PoseOptimiserOptions& options = {});
+
+}  // namespace roslam

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/semantics/segmenter_options.hpp"
+
+#include <string>
+
+#include "roslam/common/error.hpp"
+
+namespace roslam {
+
+namespace {
+constexpr int kSizeMultiple = 32;  // pixels; PspnetSegmenter rounds both sides to multiples of this
+}
+
+void SegmenterOptions::validate() const {
+  if (working_side < kSizeMultiple || working_side > 4096) {
+    throw OptionsError("segmenter.working_side must be 32 to 4096 pixels");
+  }
+}
+
+}  // namespace roslam

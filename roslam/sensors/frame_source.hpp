@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+
+#include "roslam/common/export.hpp"
+#include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/se3.hpp"
+
+namespace roslam {
+
+/// One RGB-D frame.
+struct ROSLAM_EXPORT Frame {
+  std::size_t index = 0;   ///< position in the source, counted from 0; skipped frames leave gaps
+  double timestamp = 0.0;  ///< seconds, as given by the source
+  cv::Mat colour;          ///< CV_8UC3, BGR, raw (distorted)
+  cv::Mat depth;           ///< CV_32FC1, metres along the optical axis, 0 = unknown; registered to colour
+  cv::Mat labels;          ///< CV_8UC1 class of each pixel if the source knows it, else empty
+  std::optional<SE3> T_world_camera;  ///< ground truth if the source has it; never used for tracking
+};
+
+/// Source of frames, such as a recorded dataset or a simulation. Implementations skip frames they cannot
+/// read, count them by reason, and throw InputError only if the source as a whole is unusable.
+class ROSLAM_EXPORT FrameSource {
+ public:
+  FrameSource() = default;
+  FrameSource(const FrameSource&) = delete;
+  FrameSource& operator=(const FrameSource&) = delete;
+  virtual ~FrameSource() = default;
+
+  /// The next frame, or nothing at the end. Timestamps strictly increase, unless the clock of a live source restarts.
+  virtual std::optional<Frame> next() = 0;
+
+  /// Makes a waiting next() return nothing soon, such as when a camera has stalled. Safe from any thread.
+  virtual void interrupt() {}
+
+  virtual const Camera& camera() const = 0;
+
+  /// Number of frames in the source, skipped ones included, if known.
+  virtual std::optional<std::size_t> size() const { return std::nullopt; }
+
+  /// Frames skipped so far, by reason in words.
+  virtual std::map<std::string, std::size_t> skipped() const { return {}; }
+
+  /// Depth images that could not be used so far, by reason in words; their frames have an empty depth.
+  virtual std::map<std::string, std::size_t> skipped_depth() const { return {}; }
+};
+
+}  // namespace roslam

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "roslam/common/export.hpp"
+#include "roslam/sensors/frame_source.hpp"
+
+namespace roslam {
+
+struct ROSLAM_EXPORT TumOptions {
+  double max_time_difference = 0.02;  ///< seconds between a colour image and the depth image paired with it
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+};
+
+/// One line of rgb.txt or depth.txt.
+struct ROSLAM_EXPORT TimedFile {
+  double timestamp = 0.0;      ///< seconds
+  std::filesystem::path file;  ///< relative to the dataset folder
+};
+
+/// The files that an rgb.txt or depth.txt names, as listed; lines whose time is not finite are ignored.
+/// Throws InputError if the file is missing, malformed or names no image.
+ROSLAM_EXPORT std::vector<TimedFile> read_tum_list(const std::filesystem::path& file);
+
+/// Pairs each colour image with the depth image nearest in time; each depth image is used once. The result
+/// holds an index into depth or -1, one for each colour image. Both lists must be sorted by time.
+ROSLAM_EXPORT std::vector<int> associate_by_time(const std::vector<TimedFile>& colour,
+                                         const std::vector<TimedFile>& depth, double max_time_difference);
+
+/// A folder in the TUM RGB-D format: rgb.txt, depth.txt and the images they name (PNG or JPEG; depth 16-bit).
+/// A colour image without a depth image near in time is returned with an empty depth; images that are
+/// missing, truncated, of the wrong size, without a time or out of order are skipped and counted. Of images
+/// out of order the fewest are skipped that leave the others in order.
+class ROSLAM_EXPORT TumSource : public FrameSource {
+ public:
+  /// Throws InputError if the folder or a list is missing, malformed or names no image, CalibrationError if
+  /// the camera is invalid.
+  TumSource(const std::filesystem::path& folder, const Camera& camera, const TumOptions& options = {});
+
+  std::optional<Frame> next() override;
+  const Camera& camera() const override { return camera_; }
+  std::optional<std::size_t> size() const override { return size_; }
+  std::map<std::string, std::size_t> skipped() const override { return skipped_; }
+  std::map<std::string, std::size_t> skipped_depth() const override { return skipped_depth_; }
+
+  /// The file of a frame's colour image. index: of a frame returned by next().
+  std::filesystem::path colour_file(std::size_t index) const { return folder_ / colour_[index].file; }
+
+  /// The depth image paired with it, if there is one; it may not be readable.
+  std::optional<std::filesystem::path> depth_file(std::size_t index) const;
+
+  /// True if the folder looks like a TUM dataset.
+  static bool recognises(const std::filesystem::path& folder);
+
+ private:
+  std::optional<Frame> read(std::size_t index);
+  cv::Mat read_depth_for(std::size_t index, const cv::Size& colour_size);
+
+  std::filesystem::path folder_;
+  Camera camera_;
+  std::vector<TimedFile> colour_;
+  std::vector<TimedFile> depth_;
+  std::vector<int> depth_of_colour_;
+  std::map<std::string, std::size_t> skipped_;
+  std::map<std::string, std::size_t> skipped_depth_;
+  std::size_t size_ = 0;  // colour images listed
+  std::size_t position_ = 0;
+};
+
+}  // namespace roslam

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <stop_token>
+
+#include "roslam/common/stage_times.hpp"
+#include "roslam/dense/dense_map.hpp"
+#include "roslam/dynamic_objects/dynamic_objects.hpp"
+#include "roslam/map/ids.hpp"
+#include "roslam/map/keyframe_pose.hpp"
+#include "roslam/restoration/restored_image.hpp"
+#include "roslam/sensors/frame_source.hpp"
+#include "roslam/slam/options.hpp"
+
+namespace roslam {
+
+/// A keyframe as the dense map takes it.
+struct DenseInput {
+  Frame frame;  ///< as taken; its images must not be changed afterwards
+  DynamicObjects dynamic_objects;
+  cv::Mat labels;                 ///< of this frame or an earlier one, CV_8UC1; empty: none are known
+  SE3 T_labelled_camera;          ///< from the keyframe's camera to the camera that the labels are of
+  bool has_older_labels = false;  ///< the labels are of an earlier frame
+  bool is_restored = false;       ///< comes in two parts: restored() tells of the second
+};
+
+/// Fuses keyframes into a dense map as they come, on a thread of its own at lower priority: the tracker never
+/// waits, and a failure costs a keyframe and nothing else. In deterministic mode each is fused at once.
+class DenseWorker {
+ public:
+  /// pose_lookup: called on the worker's thread. Throws CalibrationError, OptionsError, or OptionsError
+  /// naming the component where the library was built without it.
+  DenseWorker(const Camera& camera, const Options& options, Mode mode, PoseLookup pose_lookup);
+  ~DenseWorker();
+
+  void submit(KeyframeId keyframe, DenseInput input);
+
+  /// The restored image of a keyframe that waits for it; null: there is none, the keyframe is fused with its
+  /// holes.
+  void restored(KeyframeId keyframe, const RestoredImage* image);
+
+  /// Waits until all are fused and the map has followed the keyframes to their final poses; without the
+  /// latter once cancelled.
+  void drain();
+
+  /// Discards the keyframes that wait.
+  void cancel();
+
+  /// The map as it is. Only after drain(). Nothing if a stop was requested before it was extracted.
+  std::optional<DenseMap> result(SubmapId submap, const std::stop_token& stop = {}) const;
+
+  StageTimes times() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace roslam

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// In place of dense_worker.cpp in a library without the component dense.
+#include "roslam/common/error.hpp"
+#include "roslam/slam/dense_worker.hpp"
+
+namespace roslam {
+
+struct DenseWorker::Impl {};
+
+DenseWorker::DenseWorker(const Camera&, const Options&, Mode, PoseLookup) {
+  throw OptionsError(
+      "dense.enabled: this library was built without the dense map (ROSLAM_DENSE); use --no-dense");
+}
+
+DenseWorker::~DenseWorker() = default;
+void DenseWorker::submit(KeyframeId, DenseInput) {}
+void DenseWorker::restored(KeyframeId, const RestoredImage*) {}
+void DenseWorker::drain() {}
+void DenseWorker::cancel() {}
+std::optional<DenseMap> DenseWorker::result(SubmapId, const std::stop_token&) const { return std::nullopt; }
+StageTimes DenseWorker::times() const { return {}; }
+
+}  // namespace roslam

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "roslam/common/export.hpp"
+#include "roslam/dynamic_objects/dynamic_objects.hpp"
+#include "roslam/geometry/se3.hpp"
+#include "roslam/map/ids.hpp"
+#include "roslam/tracking/tracking_state.hpp"
+
+namespace roslam {
+
+/// Why a frame was not used.
+enum class RejectReason {
+  kNone,               ///< it was used
+  kNoColour,           ///< no colour image
+  kColourType,         ///< colour image is not 8-bit BGR
+  kColourSize,         ///< colour image size differs from the camera's
+  kDepthType,          ///< depth image is not 32-bit float
+  kDepthSize,          ///< depth image size differs from the colour image's
+  kMask,               ///< the mask given with the frame is not 8-bit or not of its size
+  kTimeNotFinite,      ///< the timestamp is not a number
+  kTimeNotIncreasing,  ///< the timestamp is not later than that of the last frame that was used
+  kNoMapToLocaliseIn   ///< keyframes.enabled is false and the map is empty
+};
+
+/// In words, for messages and reports.
+ROSLAM_EXPORT std::string_view describe(RejectReason reason);
+
+/// What became of a frame.
+struct ROSLAM_EXPORT FrameResult {
+  std::size_t index = 0;                        ///< of the frame in its source
+  double timestamp = 0.0;                       ///< seconds
+  RejectReason rejected = RejectReason::kNone;  ///< if not kNone, nothing below but state is set
+  TrackingState state = TrackingState::kInitialising;
+  std::optional<SE3>
+      T_world_camera;    ///< as estimated now; later corrections of the map are in Slam::trajectory()
+  SubmapId submap;       ///< that the pose is in; submaps that overlap are merged later
+  int inliers = 0;       ///< landmarks that support the pose
+  double quality = 0.0;  ///< tracking quality, 0 (predicted or unknown) to 1
+  bool is_keyframe = false;
+  bool is_clock_reset = false;              ///< the source's clock was found to have restarted at this frame
+  double tracking_seconds = 0.0;            ///< processor time of the tracking thread
+  DynamicObjects dynamic_objects;           ///< what was found to move, or may move
+  std::vector<cv::Point2f> points;          ///< corners that were used, pixels of the image as taken
+  std::vector<cv::Point2f> removed_points;  ///< corners on dynamic objects, which were not used
+
+  bool is_used() const { return rejected == RejectReason::kNone; }
+};
+
+}  // namespace roslam

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/slam/front_end.hpp"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "roslam/common/stopwatch.hpp"
+#include "roslam/slam/settings.hpp"
+
+namespace roslam {
+
+FrontEnd::FrontEnd(const Camera& camera, const Options& options, Mode mode,
+                   std::shared_ptr<Segmenter> segmenter)
+    : camera_(camera),
+      options_(options),
+      mode_(mode),
+      segmentation_(options.dynamic_objects.labels ? std::move(segmenter) : nullptr, mode, options.threads),
+      detector_(camera, detector_settings(options)),
+      extractor_(options.orb) {}
+
+bool FrontEnd::detects() const {
+  return segmentation_.is_on() || options_.dynamic_objects.depth_consistency || options_.dynamic_objects.flow;
+}
+
+FrontEndResult FrontEnd::observe(const Frame& frame, const cv::Mat& mask,
+                                 const std::optional<SE3>& predicted_T_camera_world,
+                                 std::size_t frame_count) {
+  const Stopwatch watch;
+  FrontEndResult result;
+  cv::Mat grey;
+  cv::cvtColor(frame.colour, grey, cv::COLOR_BGR2GRAY);
+  if (detects()) result.dynamic_objects = detect(frame, grey, predicted_T_camera_world, frame_count);
+  result.detection_seconds = watch.seconds();
+  extract(frame, grey, mask, frame_count, result);
+  const cv::Mat& hidden = result.dynamic_objects.mask;
+  if (!hidden.empty()) result.hidden_share = cv::countNonZero(hidden) / static_cast<double>(hidden.total());
+  result.extraction_seconds = watch.seconds() - result.detection_seconds;
+  return result;
+}
+
+DynamicObjects FrontEnd::detect(const Frame& frame, const cv::Mat& grey,
+                                const std::optional<SE3>& predicted_T_camera_world, std::size_t frame_count) {
+  const auto every = static_cast<std::size_t>(options_.dynamic_objects.label_every);
+  if (mode_ == Mode::kRealTime || frame_count % every == 0) segmentation_.offer(frame.index, frame.colour);
+  const auto labels = segmentation_.take();
+  DynamicObjects objects = detector_.detect(frame, grey, predicted_T_camera_world, labels);
+  // Labels that the detector rejected are not for the dense map either.
+  if (labels && objects.label_age == static_cast<int>(frame.index - labels->index)) {
+    labelled_index_ = labels->index;
+    labels_ = labels->segmentation.labels;
+  }
+  return objects;
+}
+
+void FrontEnd::extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& mask, std::size_t frame_count,
+                       FrontEndResult& result) {
+  cv::Mat forbidden = result.dynamic_objects.mask;
+  // Where few static points are left, movable objects at rest are used for this frame.
+  const bool is_scarce = frame_count > 0 && last_inliers_ < options_.dynamic_objects.scarce_points;
+  const cv::Mat resting = is_scarce ? result.dynamic_objects.resting : cv::Mat();
+  if (!resting.empty()) forbidden = forbidden & ~resting;
+  if (!mask.empty()) forbidden = forbidden.empty() ? mask : cv::Mat(forbidden | mask);
+  const auto features = extractor_.extract(grey, forbidden, &result.removed_points);
+  for (const auto& feature : features) result.points.push_back(feature.pixel);
+  auto view = std::make_shared<ObservedFrame>(
+      roslam::observe(features, frame.colour, frame.depth, camera_, options_.depth));
+  if (!resting.empty()) {
+    for (const auto& feature : features) {
+      const cv::Point pixel(std::min(cvRound(feature.pixel.x), resting.cols - 1),
+                            std::min(cvRound(feature.pixel.y), resting.rows - 1));
+      view->is_movable.push_back(resting.at<std::uint8_t>(pixel) != 0);
+    }
+  }
+  result.view = std::move(view);
+}
+
+bool FrontEnd::follow_corrections(const Map& map, const std::optional<SE3>& tracked_T_camera_world) {
+  if (map_revision_ == map.corrections()) return false;
+  map_revision_ = map.corrections();
+  if (tracked_T_camera_world && measured_T_camera_world_) {
+    detector_.apply_correction(tracked_T_camera_world->inverse() * *measured_T_camera_world_);
+    measured_T_camera_world_ = tracked_T_camera_world;
+  }
+  return true;
+}
+
+void FrontEnd::remember(const TrackedFrame& frame, const Map& map, const FrontEndResult& observation) {
+  last_inliers_ = frame.inliers;
+  const bool is_measured = frame.state == TrackingState::kTracking;
+  // Only a measured pose is one that the map can be asked for again after it was corrected.
+  if (is_measured) measured_T_camera_world_ = frame.T_camera_world;
+  if (frame.T_camera_world) {
+    const bool is_other_submap =
+        last_reference_.is_valid() &&
+        (!frame.reference.is_valid() || map.submap_of(frame.reference) != map.submap_of(last_reference_));
+    if (is_other_submap) detector_.leave_submap();
+    last_reference_ = frame.reference;
+  }
+  if (detects())
+    detector_.remember(is_measured ? frame.T_camera_world : std::nullopt, observation.points,
+                       observation.removed_points);
+}
+
+void FrontEnd::reset() {
+  detector_.reset();
+  labels_.release();
+}
+
+std::vector<float> FrontEnd::level_scales() const {
+  std::vector<float> scales;
+  for (int level = 0; level < extractor_.levels(); ++level) scales.push_back(extractor_.scale(level));
+  return scales;
+}
+
+std::map<std::string, std::size_t> FrontEnd::faults() const {
+  auto faults = segmentation_.faults();
+  for (const auto& [reason, count] : detector_.faults()) faults[reason] += count;
+  if (detector_.flickers() > 0) faults["labels come and go"] += detector_.flickers();
+  return faults;
+}
+
+}  // namespace roslam

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "roslam/dynamic_objects/dynamic_object_detector.hpp"
+#include "roslam/features/observed_frame.hpp"
+#include "roslam/features/orb_extractor.hpp"
+#include "roslam/map/map.hpp"
+#include "roslam/sensors/frame_source.hpp"
+#include "roslam/slam/options.hpp"
+#include "roslam/slam/segmentation_worker.hpp"
+#include "roslam/tracking/tracker.hpp"
+
+namespace roslam {
+
+/// What the front end makes of a frame.
+struct FrontEndResult {
+  DynamicObjects dynamic_objects;
+  std::shared_ptr<const ObservedFrame> view;
+  std::vector<cv::Point2f> points;          ///< corners that were used, pixels of the image as taken
+  std::vector<cv::Point2f> removed_points;  ///< corners on dynamic objects
+  double hidden_share = 0.0;                ///< of the image, covered by dynamic objects
+  double detection_seconds = 0.0;           ///< processor time
+  double extraction_seconds = 0.0;          ///< processor time
+};
+
+/// Labels and geometry give the mask of dynamic objects, ORB features are extracted outside it (eq. 11) and
+/// depth is joined to them. Also keeps which revision of the map its poses are of: a loop closure moves the
+/// map under the depth and poses of earlier frames that the detection compares with. Used by the tracking
+/// thread only.
+class FrontEnd {
+ public:
+  /// segmenter: null, or what labels frames.
+  FrontEnd(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter);
+
+  /// True if dynamic objects are detected at all.
+  bool detects() const;
+
+  /// predicted_T_camera_world: pose that the motion so far suggests, if known. mask: empty, or CV_8UC1 of the
+  /// frame's size, nonzero where no feature may be extracted. frame_count: frames used so far.
+  FrontEndResult observe(const Frame& frame, const cv::Mat& mask,
+                         const std::optional<SE3>& predicted_T_camera_world, std::size_t frame_count);
+
+  /// Takes over corrections of the map since the last call: tracked_T_camera_world is the pose of the last
+  /// measured frame as the map has it now. Returns false if there were none. The caller holds the map's
+  /// mutex.
+  bool follow_corrections(const Map& map, const std::optional<SE3>& tracked_T_camera_world);
+
+  /// Tells what tracking made of the frame that observe() was called for. The caller holds the map's mutex.
+  void remember(const TrackedFrame& frame, const Map& map, const FrontEndResult& observation);
+
+  /// Forgets earlier frames, as after a reset of the source's clock.
+  void reset();
+
+  /// The newest labels that were accepted (CV_8UC1, empty if none so far) and the frame they are of.
+  const cv::Mat& labels() const { return labels_; }
+  std::size_t labelled_index() const { return labelled_index_; }
+
+  std::vector<float> level_scales() const;
+  std::map<std::string, std::size_t> faults() const;
+  StageTimes times() const { return segmentation_.times(); }
+
+ private:
+  DynamicObjects detect(const Frame& frame, const cv::Mat& grey,
+                        const std::optional<SE3>& predicted_T_camera_world, std::size_t frame_count);
+  void extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& mask, std::size_t frame_count,
+               FrontEndResult& observation);
+
+  Camera camera_;
+  Options options_;
+  Mode mode_;
+  SegmentationWorker segmentation_;
+  DynamicObjectDetector detector_;
+  OrbExtractor extractor_;
+  cv::Mat labels_;
+  std::size_t labelled_index_ = 0;
+  int last_inliers_ = 0;
+  // The last frame whose pose was measured: pose in the map as it was by then, and how often it was corrected
+  // by then.
+  std::optional<SE3> measured_T_camera_world_;
+  std::size_t map_revision_ = 0;
+  KeyframeId last_reference_;
+};
+
+}  // namespace roslam

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "roslam/common/bounded_queue.hpp"
+#include "roslam/sensors/frame_source.hpp"
+
+namespace roslam {
+
+/// Reads a recorded source on a thread of its own and hands out frames at the pace of their timestamps, as a
+/// camera would. Frames that nobody takes in time are dropped and counted, the oldest first.
+class PacedReader {
+ public:
+  /// source must outlive the reader and is used by nobody else meanwhile. queue_size: frames that may wait.
+  PacedReader(FrameSource& source, std::size_t queue_size);
+  ~PacedReader() { stop(); }
+  PacedReader(const PacedReader&) = delete;
+  PacedReader& operator=(const PacedReader&) = delete;
+
+  /// Waits for the next frame; nothing at the end of the source or after stop(). Throws what the source
+  /// threw.
+  std::optional<Frame> next();
+
+  /// Ends reading: next() returns at once, the frames that wait are not handed out. May be called from any
+  /// thread.
+  void stop();
+
+  std::size_t dropped() const { return dropped_; }
+
+ private:
+  void read(const std::stop_token& stop);
+  static std::chrono::steady_clock::duration pause(double from, double to);
+
+  FrameSource& source_;
+  BoundedQueue<Frame> queue_;
+  std::mutex mutex_;
+  std::condition_variable_any tick_;
+  std::atomic<std::size_t> dropped_ = 0;
+  std::exception_ptr failure_;  // written before the queue closes, read after
+  std::jthread thread_;         // last, so that it stops before the members it uses are destroyed
+};
+
+}  // namespace roslam

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/slam/slam.hpp"
+
+#include <mutex>
+#include <utility>
+
+#include "roslam/slam/settings.hpp"
+#include "roslam/slam/slam_impl.hpp"
+
+namespace roslam {
+
+Slam::Slam(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,
+           std::shared_ptr<const Vocabulary> vocabulary)
+    : impl_(std::make_unique<Impl>(camera, options, mode, std::move(segmenter), std::move(vocabulary))) {}
+
+Slam::~Slam() { impl_->cancel(); }
+
+void Slam::load_map(SavedMap saved) {
+  saved.require_fits(impl_->camera, impl_->map.scales());
+  if (impl_->keyframe_database) saved.index(*impl_->keyframe_database);
+  impl_->map = std::move(saved.map);
+  impl_->map.begin_session();
+  impl_->poses.publish(impl_->map);
+}
+
+void Slam::enable_dense_mapping() {
+  Impl& impl = *impl_;
+  impl.dense.emplace(impl.camera, impl.options, impl.mode,
+                     [&impl](const auto& keyframes) { return impl.poses.find(keyframes); });
+}
+
+void Slam::enable_restoration(std::shared_ptr<Inpainter> inpainter, OnRestored on_restored) {
+  Impl& impl = *impl_;
+  const auto hand_to_dense = [&impl](KeyframeId keyframe, const RestoredImage* image) {
+    if (impl.dense) impl.dense->restored(keyframe, image);
+  };
+  impl.restoration.emplace(
+      impl.camera, impl.options, impl.mode, std::move(inpainter),
+      [&impl](const auto& keyframes) { return impl.poses.find(keyframes); },
+      [hand_to_dense, on_restored = std::move(on_restored)](const RestoredKeyframe& restored) {
+        hand_to_dense(restored.keyframe, &restored.view);
+        if (on_restored) on_restored(restored);
+      },
+      [hand_to_dense](KeyframeId keyframe) { hand_to_dense(keyframe, nullptr); });
+}
+
+FrameResult Slam::process(const Frame& frame, const cv::Mat& mask) { return impl_->process(frame, mask); }
+
+void Slam::finish() { impl_->finish(); }
+
+void Slam::cancel() { impl_->cancel(); }
+
+Trajectory Slam::trajectory() const {
+  const std::scoped_lock lock(impl_->map_mutex);
+  return impl_->log.trajectory(impl_->map, impl_->log.main_submap(impl_->map));
+}
+
+Trajectory Slam::keyframes() const {
+  const std::scoped_lock lock(impl_->map_mutex);
+  return impl_->map.trajectory(impl_->map.session(), impl_->log.main_submap(impl_->map));
+}
+
+SubmapId Slam::main_submap() const {
+  const std::scoped_lock lock(impl_->map_mutex);
+  return impl_->log.main_submap(impl_->map);
+}
+
+bool Slam::found_in_loaded_map() const {
+  const std::scoped_lock lock(impl_->map_mutex);
+  return impl_->log.found_in_loaded_map(impl_->map);
+}
+
+std::map<SubmapId, std::size_t> Slam::frames_in_other_submaps() const {
+  const std::scoped_lock lock(impl_->map_mutex);
+  auto frames = impl_->log.frames_by_submap(impl_->map);
+  frames.erase(impl_->log.main_submap(impl_->map));
+  return frames;
+}
+
+const Map& Slam::map() const { return impl_->map; }
+
+SavedMap Slam::snapshot() const {
+  const std::scoped_lock lock(impl_->map_mutex);
+  return SavedMap::of(impl_->camera, impl_->map,
+                      impl_->keyframe_database ? &*impl_->keyframe_database : nullptr);
+}
+
+std::optional<DenseMap> Slam::dense_map(const std::stop_token& stop) const {
+  if (!impl_->dense) return std::nullopt;
+  return impl_->dense->result(main_submap(), stop);
+}
+
+std::vector<ClosedLoop> Slam::loops() const {
+  const std::scoped_lock lock(impl_->map_mutex);
+  return impl_->loop_closer ? impl_->loop_closer->closed() : std::vector<ClosedLoop>{};
+}
+
+std::size_t Slam::refused_loops() const {
+  const std::scoped_lock lock(impl_->map_mutex);
+  return impl_->loop_closer ? impl_->loop_closer->refused() : 0;
+}
+
+std::map<std::string, std::size_t> Slam::loop_faults() const { return impl_->closing.faults(); }
+
+bool Slam::restores() const { return impl_->restoration.has_value(); }
+
+std::size_t Slam::unrestored() const { return impl_->restoration ? impl_->restoration->dropped() : 0; }
+
+std::map<std::string, std::size_t> Slam::restoration_faults() const {
+  return impl_->restoration ? impl_->restoration->faults() : std::map<std::string, std::size_t>{};
+}
+
+std::map<std::string, std::size_t> Slam::labelling_faults() const { return impl_->front_end.faults(); }
+
+const Camera& Slam::camera() const { return impl_->camera; }
+const Options& Slam::options() const { return impl_->options; }
+Mode Slam::mode() const { return impl_->mode; }
+
+std::size_t Slam::frames() const { return impl_->log.frames(); }
+const std::map<TrackingState, std::size_t>& Slam::frames_by_state() const { return impl_->log.by_state(); }
+const std::map<RejectReason, std::size_t>& Slam::rejected() const { return impl_->log.rejected(); }
+std::size_t Slam::clock_resets() const { return impl_->log.clock_resets(); }
+
+StageTimes Slam::times() const {
+  StageTimes all = impl_->times;
+  all.add_all(impl_->mapping.times());
+  all.add_all(impl_->closing.times());
+  all.add_all(impl_->front_end.times());
+  if (impl_->restoration) all.add_all(impl_->restoration->times());
+  if (impl_->dense) all.add_all(impl_->dense->times());
+  return all;
+}
+
+}  // namespace roslam

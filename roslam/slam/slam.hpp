@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "roslam/common/export.hpp"
+#include "roslam/common/stage_times.hpp"
+#include "roslam/dense/dense_map.hpp"
+#include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/trajectory.hpp"
+#include "roslam/loop_closing/closed_loop.hpp"
+#include "roslam/map_io/saved_map.hpp"
+#include "roslam/restoration/inpainter.hpp"
+#include "roslam/semantics/segmenter.hpp"
+#include "roslam/sensors/frame_source.hpp"
+#include "roslam/slam/frame_result.hpp"
+#include "roslam/slam/options.hpp"
+#include "roslam/slam/restored_keyframe.hpp"
+
+namespace roslam {
+
+/// The pipeline: frames in, trajectory and map out. open_slam() makes one with all its parts.
+///
+/// Threads: process(), finish() and all functions that give results are called from one thread, results other
+/// than counts only after finish() in real-time mode. cancel() may be called from any thread.
+class ROSLAM_EXPORT Slam {
+ public:
+  /// segmenter: labels frames on a thread of its own, null: none. vocabulary: for place recognition, null:
+  /// neither loops are closed nor submaps merged. Throws CalibrationError or OptionsError.
+  Slam(const Camera& camera, const Options& options = {}, Mode mode = Mode::kDeterministic,
+       std::shared_ptr<Segmenter> segmenter = nullptr,
+       std::shared_ptr<const Vocabulary> vocabulary = nullptr);
+
+  /// Discards what is queued. Call finish() first to have it processed.
+  ~Slam();
+  Slam(const Slam&) = delete;
+  Slam& operator=(const Slam&) = delete;
+
+  /// Continues the map of an earlier session: the camera is localised in it. Call before the first frame.
+  /// Throws InputError if the map was made with another camera or other pyramid levels.
+  void load_map(SavedMap saved);
+
+  /// Fuses keyframes into a dense map from now on, in real-time mode on another thread; restored keyframes,
+  /// if enable_restoration() is called as well. Call before the first frame. Throws OptionsError in a library
+  /// without the component dense.
+  void enable_dense_mapping();
+
+  /// Restores each keyframe from now on and hands it out, in real-time mode on another thread. inpainter:
+  /// fills what no frame shows, null: a diffusion method does. on_restored: may be empty. Call before the
+  /// first frame.
+  void enable_restoration(std::shared_ptr<Inpainter> inpainter, OnRestored on_restored = {});
+
+  /// Tracks a frame and, if it becomes a keyframe, maps it (in real-time mode: on another thread). mask:
+  /// empty, or CV_8UC1 of the frame's size, nonzero where no feature may be extracted, in addition to dynamic
+  /// objects. The images of the frame must not be changed afterwards: keyframes are processed later. A frame
+  /// that cannot be used is counted, and the result says why. Throws what the mapping thread threw, and
+  /// MemoryError.
+  FrameResult process(const Frame& frame, const cv::Mat& mask = {});
+
+  /// Waits for mapping, loop closing and all other stages. Call before reading results. Throws what mapping
+  /// threw.
+  void finish();
+
+  /// Makes finish() return soon: queues are discarded and optimisations in progress end at their next
+  /// iteration, with what they have reached. No keyframe is mapped any more. May be called from any thread.
+  void cancel();
+
+  /// Poses of all frames tracked in the main submap, with all later corrections of the map, in the order of
+  /// frames.
+  Trajectory trajectory() const;
+
+  /// Poses of this session's keyframes in the main submap that are still in the map.
+  Trajectory keyframes() const;
+
+  /// Of several submaps that were never merged: one of the map that was loaded, if a frame was tracked in it;
+  /// else the one with most tracked frames.
+  SubmapId main_submap() const;
+
+  /// True if a frame was tracked in the map that was loaded; the main submap is then of that map.
+  bool found_in_loaded_map() const;
+
+  /// Frames tracked in each submap other than the main one.
+  std::map<SubmapId, std::size_t> frames_in_other_submaps() const;
+
+  const Map& map() const;
+
+  /// A copy of the map, for save_map().
+  SavedMap snapshot() const;
+
+  /// The dense map of the main submap; nothing if none is made, or if stop was requested before it was
+  /// extracted.
+  std::optional<DenseMap> dense_map(const std::stop_token& stop = {}) const;
+
+  /// Loops that were closed so far, how many were rejected, and what failed, by message.
+  std::vector<ClosedLoop> loops() const;
+  std::size_t refused_loops() const;
+  std::map<std::string, std::size_t> loop_faults() const;
+
+  bool restores() const;
+  /// Keyframes that there was no time to restore, and what failed with others, by message.
+  std::size_t unrestored() const;
+  std::map<std::string, std::size_t> restoration_faults() const;
+
+  /// What failed in labelling so far, by message.
+  std::map<std::string, std::size_t> labelling_faults() const;
+
+  const Camera& camera() const;
+  const Options& options() const;
+  Mode mode() const;
+
+  /// Frames that were used, these by state, and those that were not by reason.
+  std::size_t frames() const;
+  const std::map<TrackingState, std::size_t>& frames_by_state() const;
+  const std::map<RejectReason, std::size_t>& rejected() const;
+
+  /// How often the source's clock was found to have restarted.
+  std::size_t clock_resets() const;
+
+  /// Processor time of every stage so far.
+  StageTimes times() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace roslam

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "roslam/loop_closing/loop_closer.hpp"
+#include "roslam/map/map.hpp"
+#include "roslam/map/map_mutex.hpp"
+#include "roslam/mapping/local_mapper.hpp"
+#include "roslam/place_recognition/keyframe_database.hpp"
+#include "roslam/slam/dense_worker.hpp"
+#include "roslam/slam/frame_gate.hpp"
+#include "roslam/slam/front_end.hpp"
+#include "roslam/slam/keyframe_worker.hpp"
+#include "roslam/map/keyframe_pose_table.hpp"
+#include "roslam/slam/restoration_worker.hpp"
+#include "roslam/slam/slam.hpp"
+#include "roslam/slam/trajectory_log.hpp"
+#include "roslam/tracking/keyframe_policy.hpp"
+#include "roslam/tracking/tracker.hpp"
+
+namespace roslam {
+
+/// The parts of the pipeline and how they are joined.
+struct Slam::Impl {
+  Impl(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,
+       std::shared_ptr<const Vocabulary> vocabulary);
+
+  FrameResult process(const Frame& frame, const cv::Mat& mask);
+  void finish();
+  void cancel();
+
+  void restart_clock(double timestamp);
+  std::optional<SE3> predict_pose(double timestamp);
+  KeyframeId create_keyframe(TrackedFrame& tracked, std::size_t frame_index);
+  std::vector<KeyframeId> similar_keyframes(const ObservedFrame& view) const;
+  void cull_contradicted(const TrackedFrame& tracked, const Frame& frame, const DynamicObjects& objects);
+  void map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
+  void close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
+  bool needs_poses() const { return dense || restoration; }
+  void publish_poses();
+  void submit(KeyframeId keyframe, const Frame& frame, const DynamicObjects& objects);
+  void note_times(const FrontEndResult& observation, double total);
+
+  Camera camera;
+  Options options;
+  Mode mode;
+  FrameGate gate;
+  FrontEnd front_end;
+  MapMutex map_mutex;
+  Map map;
+  KeyframePoseTable poses;
+  Tracker tracker;
+  KeyframePolicy keyframe_policy;
+  LocalMapper mapper;
+  std::optional<KeyframeDatabase> keyframe_database;
+  std::optional<LoopCloser> loop_closer;
+  TrajectoryLog log;
+  StageTimes times;
+  // Last, so that their threads stop before the members they use are destroyed.
+  std::optional<DenseWorker> dense;
+  std::optional<RestorationWorker> restoration;
+  KeyframeWorker closing;
+  KeyframeWorker mapping;
+};
+
+}  // namespace roslam

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/slam/trajectory_log.hpp"
+
+#include <algorithm>
+
+namespace roslam {
+
+namespace {
+// Submaps with keyframes of earlier sessions.
+std::set<SubmapId> loaded_submaps(const Map& map) {
+  std::set<SubmapId> submaps;
+  for (const KeyframeId id : map.keyframe_ids()) {
+    const Keyframe& keyframe = *map.find(id);
+    if (keyframe.session < map.session()) submaps.insert(keyframe.submap);
+  }
+  return submaps;
+}
+}  // namespace
+
+void TrajectoryLog::add(const TrackedFrame& frame, std::size_t index, const Map& map) {
+  ++by_state_[frame.state];
+  Record record{index, frame.timestamp, {}, {}};
+  if (frame.T_camera_world && frame.reference.is_valid()) {
+    record.reference = frame.reference;
+    record.T_camera_reference = *frame.T_camera_world * map.T_camera_world(frame.reference).inverse();
+  }
+  records_.push_back(record);
+}
+
+Trajectory TrajectoryLog::trajectory(const Map& map, SubmapId submap) const {
+  Trajectory result;
+  for (const auto& record : records_) {
+    if (!record.reference.is_valid() || map.submap_of(record.reference) != submap) continue;
+    const SE3 T_camera_world = record.T_camera_reference * map.T_camera_world(record.reference);
+    result.push_back({record.timestamp, T_camera_world.inverse()});
+  }
+  return result;
+}
+
+std::optional<SE3> TrajectoryLog::T_frame_keyframe(const Map& map, std::size_t frame_index,
+                                                   KeyframeId keyframe, double max_age) const {
+  const auto record = std::find_if(records_.rbegin(), records_.rend(),
+                                   [&](const Record& candidate) { return candidate.index <= frame_index; });
+  const bool is_known = record != records_.rend() && record->index == frame_index &&
+                        record->reference.is_valid() &&
+                        records_.back().timestamp - record->timestamp <= max_age;
+  if (!is_known || map.submap_of(record->reference) != map.submap_of(keyframe)) return std::nullopt;
+  return record->T_camera_reference * map.T_camera_world(record->reference) *
+         map.T_camera_world(keyframe).inverse();
+}
+
+std::map<SubmapId, std::size_t> TrajectoryLog::frames_by_submap(const Map& map) const {
+  std::map<SubmapId, std::size_t> frames;
+  for (const auto& record : records_) {
+    if (record.reference.is_valid()) ++frames[map.submap_of(record.reference)];
+  }
+  return frames;
+}
+
+bool TrajectoryLog::found_in_loaded_map(const Map& map) const {
+  const std::set<SubmapId> loaded = loaded_submaps(map);
+  const auto frames = frames_by_submap(map);
+  return std::any_of(frames.begin(), frames.end(),
+                     [&](const auto& entry) { return loaded.count(entry.first) > 0; });
+}
+
+SubmapId TrajectoryLog::main_submap(const Map& map) const {
+  auto frames = frames_by_submap(map);
+  // Coordinates of the map that was loaded stay valid.
+  const std::set<SubmapId> loaded = loaded_submaps(map);
+  const auto is_loaded = [&](const auto& entry) { return loaded.count(entry.first) > 0; };
+  if (std::any_of(frames.begin(), frames.end(), is_loaded))
+    std::erase_if(frames, [&](const auto& entry) { return !is_loaded(entry); });
+  const auto most = std::max_element(frames.begin(), frames.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  return most != frames.end() ? most->first : SubmapId{0};
+}
+
+}  // namespace roslam

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "roslam/geometry/trajectory.hpp"
+#include "roslam/map/map.hpp"
+#include "roslam/slam/frame_result.hpp"
+#include "roslam/tracking/tracker.hpp"
+
+namespace roslam {
+
+/// What became of every frame of a session. A frame's pose is kept relative to its reference keyframe, so
+/// that corrections of the map move it too. Functions that take a map expect the one of the session; the
+/// caller holds its mutex.
+class TrajectoryLog {
+ public:
+  /// index: of the frame in its source.
+  void add(const TrackedFrame& frame, std::size_t index, const Map& map);
+  void add_rejected(RejectReason reason) { ++rejected_[reason]; }
+  void add_clock_reset() { ++clock_resets_; }
+
+  std::size_t frames() const { return records_.size(); }  ///< that were used
+  const std::map<TrackingState, std::size_t>& by_state() const { return by_state_; }
+  const std::map<RejectReason, std::size_t>& rejected() const { return rejected_; }
+  std::size_t clock_resets() const { return clock_resets_; }
+
+  /// Poses of the frames tracked in a submap, in the order of frames.
+  Trajectory trajectory(const Map& map, SubmapId submap) const;
+
+  /// The pose of a keyframe in the camera frame of an earlier frame: T_frame_keyframe. Nothing if that frame
+  /// has no pose, is of another submap or is more than max_age (seconds) older than the newest frame.
+  std::optional<SE3> T_frame_keyframe(const Map& map, std::size_t frame_index, KeyframeId keyframe,
+                                      double max_age) const;
+
+  std::map<SubmapId, std::size_t> frames_by_submap(const Map& map) const;
+
+  /// Of several submaps: one of the map that was loaded, if any frame was tracked in it, else the one with
+  /// most frames.
+  SubmapId main_submap(const Map& map) const;
+
+  /// True if a frame was tracked in the map that was loaded.
+  bool found_in_loaded_map(const Map& map) const;
+
+ private:
+  struct Record {
+    std::size_t index;     // of the frame in its source
+    double timestamp;      // seconds
+    KeyframeId reference;  // invalid: not tracked
+    SE3 T_camera_reference;
+  };
+
+  std::vector<Record> records_;
+  std::map<TrackingState, std::size_t> by_state_;
+  std::map<RejectReason, std::size_t> rejected_;
+  std::size_t clock_resets_ = 0;
+};
+
+}  // namespace roslam

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "roslam/common/export.hpp"
+
+namespace roslam {
+
+struct ROSLAM_EXPORT TrackerOptions {
+  int min_initial_points = 80;     ///< points of known depth that the first keyframe needs
+  int min_inliers = 20;            ///< landmarks that must agree on a pose
+  int min_frame_matches = 15;      ///< matches that must agree on the first estimate, before the local map
+  double min_agreement = 0.5;      ///< share of all matches that must agree on the first estimate
+  int trusted_inliers = 60;        ///< inliers from which on the tracking quality is 1
+  int scarce_inliers = 50;         ///< below that many matches, points without a landmark are used as well
+  double hidden_share = 0.5;       ///< of the image; from which a pose is predicted if tracking fails
+  double max_predicted = 1.5;      ///< seconds since the last tracked frame for which they are
+  int recently_lost_frames = 30;   ///< frames after which recently lost becomes lost
+  int new_submap_after_lost = 30;  ///< lost frames that could start a map before a new submap is; 0: never
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+};
+
+struct ROSLAM_EXPORT LocalMapOptions {
+  int max_keyframes = 40;  ///< keyframes whose landmarks are searched for
+  int neighbours = 5;      ///< covisible keyframes of the reference keyframe that are added
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+};
+
+struct ROSLAM_EXPORT RelocaliserOptions {
+  int candidates = 4;    ///< similar keyframes tried for one frame, and as many others
+  int min_inliers = 40;  ///< landmarks that must agree on the pose
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+};
+
+struct ROSLAM_EXPORT KeyframePolicyOptions {
+  bool enabled = true;         ///< false: no keyframe is created, the map is not extended
+  double max_interval = 1.0;   ///< seconds after which one may be created even if the mapper is busy
+  double min_interval = 0.0;   ///< minimum seconds between keyframes
+  double min_overlap = 0.6;    ///< share of the reference's landmarks tracked, below which one is created
+  int min_tracked_near = 100;  ///< with fewer near landmarks tracked, and min_new_near, one is created
+  int min_new_near = 70;       ///< near points without a landmark that this takes
+  double near = 3.0;           ///< metres; maximum depth of near points
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+};
+
+}  // namespace roslam
