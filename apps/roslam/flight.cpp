@@ -161,18 +161,19 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
       if (!failure) failure = std::current_exception();
     }
   };
-  // The trajectory and the map before what may take long. On a full disk they are written again when the log,
-  // which then removes its files, has made room.
-  bool is_written = true;
+  // The trajectory and the map before what may take long.
+  std::exception_ptr unwritten;
   try {
     folder.write_flight(*flight.slam);
-  } catch (const OutputError&) {
-    is_written = false;
+  } catch (...) {
+    unwritten = std::current_exception();
   }
   if (log) attempt([&] { log->finish(); });
+  // A log that failed has removed its files: on a full disk there may be room now.
+  if (unwritten && failure) attempt([&] { folder.write_flight(*flight.slam); });
+  if (!failure) failure = unwritten;
   if (flight.slam->restores()) attempt([&] { end_restoration(flight, *restorations, folder); });
   if (log) flight.summary.removal = log->tally();
-  if (!is_written) attempt([&] { folder.write_flight(*flight.slam); });
   attempt([&] { flight.summary.dense = flight.slam->dense_map(urgent_stop); });
   attempt([&] { folder.write(*flight.slam, flight.summary, *flight.source, flight.description); });
   if (failure) std::rethrow_exception(failure);
