@@ -1,69 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The essential graph of maps of known covisibility, and corrections of maps that changed meanwhile.
+// The essential graph of maps of known covisibility.
 #include "roslam/loop_closing/essential_graph.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <memory>
 
+#include "tests/keyframe_scene.hpp"
 #include "tests/loop_scene.hpp"
 
 namespace roslam {
+
+using namespace scene;
+
 namespace {
-
-SE3 pose(double x, double y, double turn) {
-  return SE3::exp((Vector6d() << x, y, 0.1 * x, 0.0, turn, 0.02).finished());
-}
-
-void expect_same(const SE3& a, const SE3& b) { EXPECT_LT((a.matrix() - b.matrix()).norm(), 1e-9); }
-
-// Keyframes anywhere, that share as many landmarks as a test says.
-class MapOfKeyframes : public testing::Test {
- protected:
-  static constexpr std::size_t kPoints = 300;
-
-  KeyframeId add_keyframe(SubmapId submap = SubmapId{0}) {
-    auto view = std::make_shared<ObservedFrame>();
-    view->pixels.resize(kPoints, Eigen::Vector2f::Zero());
-    view->depths.resize(kPoints, 2.0F);
-    view->levels.resize(kPoints, 0);
-    view->angles.resize(kPoints, 0.0F);
-    view->colours.resize(kPoints);
-    view->descriptors.resize(kPoints);
-    next_point_.push_back(0);
-    const auto i = static_cast<double>(map_.keyframe_slots());
-    return map_.add_keyframe(map_.keyframe_slots(), i, pose(0.3 * i, std::sin(i), 0.1 * i), view, submap);
-  }
-
-  std::vector<KeyframeId> add_keyframes(int count) {
-    std::vector<KeyframeId> result;
-    for (int i = 0; i < count; ++i) result.push_back(add_keyframe());
-    return result;
-  }
-
-  // Landmarks that exactly these keyframes see.
-  std::vector<LandmarkId> add_landmarks(int count, const std::vector<KeyframeId>& observers) {
-    std::vector<LandmarkId> result;
-    for (int i = 0; i < count; ++i) {
-      const KeyframeId first = observers.front();
-      const Eigen::Vector3d in_camera(0.1 * i, 0.2, 2.0);
-      result.push_back(map_.add_landmark(map_.find(first)->T_camera_world.inverse() * in_camera, first,
-                                         next_point_[first.index()]++));
-      for (std::size_t k = 1; k < observers.size(); ++k)
-        map_.add_observation(result.back(), observers[k], next_point_[observers[k].index()]++);
-    }
-    return result;
-  }
-
-  SE3 relative(KeyframeId to, KeyframeId from) const {
-    return map_.T_camera_world(to) * map_.T_camera_world(from).inverse();
-  }
-
-  Map map_{{1.0F, 1.2F}};
-  MapMutex mutex_;
-  std::vector<std::uint32_t> next_point_;
-};
 
 class EssentialGraphTest : public MapOfKeyframes {
  protected:
@@ -325,112 +275,6 @@ TEST_F(DriftedRing, WhatWasAddedAfterTheSnapshotMovesAlong) {
     EXPECT_LT(difference.angle(), 0.005) << i;
   }
   EXPECT_LT((in_camera() - seen_before).norm(), 1e-9);
-}
-
-// A correction worked out on a snapshot, while the local mapper went on with the map.
-class CorrectionTest : public MapOfKeyframes {
- protected:
-  void SetUp() override {
-    k_ = add_keyframes(3);
-    landmarks_ = add_landmarks(4, {k_[1], k_[2]});
-    for (std::size_t i = 0; i < k_.size(); ++i) {
-      correction_.T_old_new[k_[i]] = pose(0.2 * static_cast<double>(i), -0.3, 0.15 * static_cast<double>(i));
-      snapshot_.push_back(map_.find(k_[i])->T_camera_world);
-    }
-    // Global bundle adjustment gave these positions for the first two.
-    for (const std::size_t i : {0U, 1U}) {
-      const Eigen::Vector3d before = map_.find(landmarks_[i])->position;
-      correction_.positions.push_back(
-          {landmarks_[i], before, motion(1) * before + Eigen::Vector3d(0, 0.04, 0)});
-    }
-  }
-
-  // From coordinates before to those after the correction, around a keyframe.
-  SE3 motion(std::size_t keyframe) const { return correction_.T_old_new.at(k_[keyframe]).inverse(); }
-
-  std::vector<KeyframeId> k_;
-  std::vector<LandmarkId> landmarks_;
-  MapCorrection correction_;
-  std::vector<SE3> snapshot_;
-};
-
-TEST_F(CorrectionTest, WithoutChangesSinceTheMapIsAsItWasWorkedOut) {
-  const Eigen::Vector3d other = map_.find(landmarks_[2])->position;
-  correction_.apply_to(map_);
-  for (std::size_t i = 0; i < k_.size(); ++i)
-    expect_same(map_.find(k_[i])->T_camera_world, snapshot_[i] * correction_.T_old_new.at(k_[i]));
-  for (const auto& known : correction_.positions)
-    EXPECT_LT((map_.find(known.landmark)->position - known.after).norm(), 1e-12);
-  EXPECT_LT((map_.find(landmarks_[2])->position - motion(1) * other).norm(), 1e-12)
-      << "with its oldest observer";
-  EXPECT_EQ(map_.corrections(), 1U);
-}
-
-TEST_F(CorrectionTest, ALandmarkThatMovedSinceTheSnapshotKeepsThatMotion) {
-  const Eigen::Vector3d moved(0.03, -0.02, 0.05);  // by local bundle adjustment
-  map_.find(landmarks_[0])->position += moved;
-  correction_.apply_to(map_);
-  const auto& known = correction_.positions[0];
-  const Eigen::Vector3d expected = known.after + motion(1).rotation() * moved;
-  EXPECT_LT((map_.find(landmarks_[0])->position - expected).norm(), 1e-12);
-  EXPECT_GT((map_.find(landmarks_[0])->position - known.after).norm(), 0.05);
-  EXPECT_LT((map_.find(landmarks_[1])->position - correction_.positions[1].after).norm(), 1e-12)
-      << "which did not move";
-}
-
-TEST_F(CorrectionTest, AKeyframeThatMovedSinceTheSnapshotKeepsThatMotion) {
-  const SE3 moved = pose(0.03, -0.02, 0.01);  // by local bundle adjustment
-  map_.find(k_[2])->T_camera_world = moved * snapshot_[2];
-  correction_.apply_to(map_);
-  expect_same(map_.find(k_[2])->T_camera_world, moved * snapshot_[2] * correction_.T_old_new.at(k_[2]));
-  expect_same(map_.find(k_[1])->T_camera_world, snapshot_[1] * correction_.T_old_new.at(k_[1]));
-}
-
-// Where keyframe and landmark moved together, the measurement still fits after the correction.
-TEST_F(CorrectionTest, MotionOfBothLeavesTheirMeasurementAsItWas) {
-  correction_.positions.erase(correction_.positions.begin());
-  correction_.positions.front().after = motion(1) * correction_.positions.front().before;
-  const SE3 moved = pose(0.03, -0.02, 0.01);  // of the world around the keyframe
-  Landmark& landmark = *map_.find(landmarks_[1]);
-  landmark.position = moved * landmark.position;
-  map_.find(k_[1])->T_camera_world = snapshot_[1] * moved.inverse();
-  const Eigen::Vector3d in_camera = map_.find(k_[1])->T_camera_world * landmark.position;
-  correction_.apply_to(map_);
-  EXPECT_LT((map_.find(k_[1])->T_camera_world * landmark.position - in_camera).norm(), 1e-9);
-}
-
-TEST_F(CorrectionTest, KeyframesAddedSinceMoveWithTheMostCovisibleOfTheSnapshot) {
-  const KeyframeId added = add_keyframe();
-  add_landmarks(3, {k_[2], added});
-  add_landmarks(5, {k_[1], added});
-  const LandmarkId own = add_landmarks(1, {added}).front();
-  const SE3 before = map_.find(added)->T_camera_world;
-  const Eigen::Vector3d position = map_.find(own)->position;
-  correction_.apply_to(map_);
-  expect_same(map_.find(added)->T_camera_world, before * correction_.T_old_new.at(k_[1]));
-  EXPECT_LT((map_.find(own)->position - motion(1) * position).norm(), 1e-9);
-}
-
-TEST_F(CorrectionTest, KeyframesAddedSinceThatShareNothingMoveWithTheLastOfTheirSubmap) {
-  const KeyframeId added = add_keyframe();
-  const KeyframeId elsewhere = add_keyframe(SubmapId{1});
-  const SE3 before = map_.find(added)->T_camera_world;
-  const SE3 elsewhere_before = map_.find(elsewhere)->T_camera_world;
-  correction_.apply_to(map_);
-  expect_same(map_.find(added)->T_camera_world, before * correction_.T_old_new.at(k_[2]));
-  expect_same(map_.find(elsewhere)->T_camera_world, elsewhere_before);
-}
-
-TEST_F(CorrectionTest, WhatWasRemovedSinceStaysAway) {
-  map_.remove_keyframe(k_[1], k_[2]);
-  map_.remove_landmark(landmarks_[0]);
-  const Eigen::Vector3d other = map_.find(landmarks_[2])->position;
-  const SE3 T_1_2 = map_.T_camera_world(k_[1]) * map_.T_camera_world(k_[2]).inverse();
-  correction_.apply_to(map_);
-  EXPECT_EQ(map_.find(k_[1]), nullptr);
-  EXPECT_EQ(map_.find(landmarks_[0]), nullptr);
-  expect_same(relative(k_[1], k_[2]), T_1_2);
-  EXPECT_LT((map_.find(landmarks_[2])->position - motion(2) * other).norm(), 1e-9) << "its oldest left";
 }
 
 }  // namespace

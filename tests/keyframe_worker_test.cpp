@@ -82,6 +82,14 @@ bool iterate(const KeyframeWorker::ShouldStop& should_stop) {
   return Clock::now() < end;
 }
 
+// A job that goes on until it is told to stop; has_stopped: whether it was.
+KeyframeWorker::Work long_work(Seen& seen, bool& has_stopped) {
+  return [&](KeyframeId id, const auto& should_stop, StageTimes&) {
+    seen.add(id);
+    has_stopped = iterate(should_stop);
+  };
+}
+
 template <typename Call>
 std::string message_thrown_by(Call&& call) {
   try {
@@ -334,12 +342,7 @@ TEST(KeyframeWorkerRealTime, SwitchingOffDiscardsAFullQueue) {
 TEST(KeyframeWorkerRealTime, CancellingEndsALongJobAndDiscardsTheQueueWithinASecond) {
   Seen seen;
   bool has_stopped = false;
-  KeyframeWorker worker(
-      [&](KeyframeId id, const auto& should_stop, StageTimes&) {
-        seen.add(id);
-        has_stopped = iterate(should_stop);
-      },
-      Mode::kRealTime, kNever);
+  KeyframeWorker worker(long_work(seen, has_stopped), Mode::kRealTime, kNever);
   for (const KeyframeId id : ids(0, 4)) worker.submit(id);
   ASSERT_TRUE(seen.wait_for(1));
   EXPECT_EQ(worker.waiting(), 3U);
@@ -380,12 +383,7 @@ TEST(KeyframeWorkerRealTime, TheDestructorDiscardsAFullQueue) {
   bool has_stopped = false;
   auto start = Clock::now();
   {
-    KeyframeWorker worker(
-        [&](KeyframeId id, const auto& should_stop, StageTimes&) {
-          seen.add(id);
-          has_stopped = iterate(should_stop);
-        },
-        Mode::kRealTime, kNever);
+    KeyframeWorker worker(long_work(seen, has_stopped), Mode::kRealTime, kNever);
     for (const KeyframeId id : ids(0, 6)) worker.submit(id);
     ASSERT_TRUE(seen.wait_for(1));
     EXPECT_EQ(worker.waiting(), 5U);

@@ -20,6 +20,7 @@
 #include "roslam/map/map_ply.hpp"
 #include "roslam/map_io/map_file.hpp"
 #include "roslam/map_io/merge_maps.hpp"
+#include "roslam/place_recognition/vocabulary.hpp"
 #include "roslam/slam/options.hpp"
 #include "roslam/slam/settings.hpp"
 
@@ -144,7 +145,7 @@ struct MergeArguments {
 
 void merge(const MergeArguments& arguments) {
   const Options options = arguments.config.empty() ? Options{} : read_options(arguments.config);
-  const auto vocabulary = load_vocabulary(arguments.vocabulary);
+  const auto vocabulary = open_vocabulary(arguments.vocabulary);
   if (vocabulary == nullptr) {
     throw InputError(
         "models/roslam-orb.vocabulary: not found beside the program; install it or name it with "

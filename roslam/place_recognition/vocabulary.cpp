@@ -23,6 +23,11 @@ std::uint64_t fnv(std::string_view bytes) {
 
 std::filesystem::path find_vocabulary() { return find_resource("roslam-orb.vocabulary"); }
 
+std::shared_ptr<const Vocabulary> open_vocabulary(const std::filesystem::path& file) {
+  const std::filesystem::path path = file.empty() ? find_vocabulary() : file;
+  return path.empty() ? nullptr : std::make_shared<const Vocabulary>(Vocabulary::load(path));
+}
+
 double similarity(const BagOfWords& a, const BagOfWords& b) {
   // For weights that sum to 1, one minus half the L1 distance is the sum of the lesser weight of each word.
   double shared = 0.0;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -88,5 +89,8 @@ class ROSLAM_EXPORT Vocabulary {
 
 /// The vocabulary supplied with the program; empty if it is missing.
 ROSLAM_EXPORT std::filesystem::path find_vocabulary();
+
+/// The vocabulary of a file, or without a name the supplied one; null if that is missing. Throws InputError.
+ROSLAM_EXPORT std::shared_ptr<const Vocabulary> open_vocabulary(const std::filesystem::path& file = {});
 
 }  // namespace roslam

@@ -50,4 +50,11 @@ class ROSLAM_EXPORT GanInpainter : public Inpainter {
 /// The folder of the installed weights; empty if any of them is missing.
 ROSLAM_EXPORT std::filesystem::path find_restoration_models();
 
+/// The networks of a folder, or without a name the installed ones; null if these are missing. Throws
+/// ModelError.
+inline std::shared_ptr<Inpainter> open_inpainter(const std::filesystem::path& folder = {}) {
+  const std::filesystem::path models = folder.empty() ? find_restoration_models() : folder;
+  return models.empty() ? nullptr : std::make_shared<GanInpainter>(models);
+}
+
 }  // namespace roslam

@@ -16,7 +16,6 @@
 namespace roslam {
 
 namespace {
-constexpr int kSizeMultiple = 32;  // both sides of the input image are multiples of this
 
 cv::Mat as_bgr(const cv::Mat& image) {
   if (image.empty()) throw InputError("segmentation needs an image, this one is empty");
@@ -39,7 +38,8 @@ cv::Mat as_bgr(const cv::Mat& image) {
 cv::Size working_size(const cv::Size& image, int working_side) {
   const double scale = static_cast<double>(working_side) / std::max(image.width, image.height);
   const auto side = [&](int pixels) {
-    return std::max(kSizeMultiple, kSizeMultiple * static_cast<int>(pixels * scale / kSizeMultiple + 0.5));
+    return std::max(kSegmenterMultiple,
+                    kSegmenterMultiple * static_cast<int>(pixels * scale / kSegmenterMultiple + 0.5));
   };
   return {side(image.width), side(image.height)};
 }
@@ -49,8 +49,8 @@ PspnetSegmenter::PspnetSegmenter(const std::filesystem::path& model, const Segme
     : model_(model), options_(options) {
   options_.validate();
   inference_ = load_inference(model, backend);
-  const int size[] = {1, 3, 2 * kSizeMultiple,
-                      2 * kSizeMultiple};  // trial run to check the shape of the output
+  const int size[] = {1, 3, 2 * kSegmenterMultiple,
+                      2 * kSegmenterMultiple};  // trial run to check the shape of the output
   if (!cv::checkRange(scores_for(cv::Mat(4, size, CV_32F, cv::Scalar(0))))) {
     throw ModelError(model_.string() + ": gives scores that are not finite; install the model again");
   }

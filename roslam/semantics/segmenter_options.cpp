@@ -7,12 +7,8 @@
 
 namespace roslam {
 
-namespace {
-constexpr int kSizeMultiple = 32;  // pixels; PspnetSegmenter rounds both sides to multiples of this
-}
-
 void SegmenterOptions::validate() const {
-  if (working_side < kSizeMultiple || working_side > 4096) {
+  if (working_side < kSegmenterMultiple || working_side > 4096) {
     throw OptionsError("segmenter.working_side must be 32 to 4096 pixels");
   }
 }

@@ -12,6 +12,8 @@ enum class InferenceBackend {
   kOnnxRuntime  ///< ONNX Runtime, optional and faster
 };
 
+inline constexpr int kSegmenterMultiple = 32;  ///< pixels; both sides of its input are multiples of this
+
 struct ROSLAM_EXPORT SegmenterOptions {
   int working_side = 416;  ///< pixels, longer side of the network's input; less is faster, more is finer
 

@@ -168,8 +168,8 @@ std::vector<DenseWorker::Impl::RemovedPoint> DenseWorker::Impl::removed_points(c
 
 std::map<KeyframeId, KeyframePose> DenseWorker::Impl::poses_of(const std::vector<KeyframeId>& ids) const {
   std::map<KeyframeId, KeyframePose> result;
-  const std::vector<KeyframePose> places = pose_lookup_(ids);
-  for (std::size_t i = 0; i < ids.size(); ++i) result.emplace(ids[i], places[i]);
+  const std::vector<KeyframePose> poses = pose_lookup_(ids);
+  for (std::size_t i = 0; i < ids.size(); ++i) result.emplace(ids[i], poses[i]);
   return result;
 }
 

@@ -18,7 +18,7 @@ namespace {
 using Note = std::function<void(const std::string&)>;
 
 // Null where nothing is to be labelled. A session without labels is still worth tracking.
-std::shared_ptr<Segmenter> open_segmenter(const SlamSetup& setup, Options& options, const Note& note) {
+std::shared_ptr<Segmenter> segmenter_of(const SlamSetup& setup, Options& options, const Note& note) {
   if (!options.dynamic_objects.labels) return nullptr;
   const auto file = setup.segmentation_model.empty() ? find_segmentation_model() : setup.segmentation_model;
   if (!file.empty()) return std::make_shared<PspnetSegmenter>(file, options.segmenter);
@@ -30,27 +30,26 @@ std::shared_ptr<Segmenter> open_segmenter(const SlamSetup& setup, Options& optio
 }
 
 // Null where no loop is to be closed.
-std::shared_ptr<const Vocabulary> open_vocabulary(const SlamSetup& setup, Options& options,
-                                                  const Note& note) {
+std::shared_ptr<const Vocabulary> vocabulary_of(const SlamSetup& setup, Options& options, const Note& note) {
   if (!options.loop.enabled) return nullptr;
-  const auto file = setup.vocabulary.empty() ? find_vocabulary() : setup.vocabulary;
-  if (!file.empty()) return std::make_shared<const Vocabulary>(Vocabulary::load(file));
-  options.loop.enabled = false;
-  note(
-      "models/roslam-orb.vocabulary: not found beside the program; no loop is closed. Install it, set "
-      "ROSLAM_MODEL_PATH or name it with --vocabulary");
-  return nullptr;
+  auto vocabulary = open_vocabulary(setup.vocabulary);
+  if (vocabulary == nullptr) {
+    options.loop.enabled = false;
+    note(
+        "models/roslam-orb.vocabulary: not found beside the program; no loop is closed. Install it, set "
+        "ROSLAM_MODEL_PATH or name it with --vocabulary");
+  }
+  return vocabulary;
 }
 
 // Null where no network is: holes are then filled by diffusion.
-std::shared_ptr<Inpainter> open_inpainter(const SlamSetup& setup, const Note& note) {
-  const auto folder = setup.restoration_models.empty() ? find_restoration_models() : setup.restoration_models;
-  if (!folder.empty()) return std::make_shared<GanInpainter>(folder);
-  note(
-      "models/roslam-restorer-*.onnx: not found beside the program; what no frame shows is filled by "
-      "diffusion "
-      "(Telea); install them, set ROSLAM_MODEL_PATH or name their folder with --models");
-  return nullptr;
+std::shared_ptr<Inpainter> inpainter_of(const SlamSetup& setup, const Note& note) {
+  auto inpainter = open_inpainter(setup.restoration_models);
+  if (inpainter == nullptr)
+    note(
+        "models/roslam-restorer-*.onnx: not found beside the program; what no frame shows is filled by "
+        "diffusion (Telea); install them, set ROSLAM_MODEL_PATH or name their folder with --models");
+  return inpainter;
 }
 }  // namespace
 
@@ -64,15 +63,15 @@ std::unique_ptr<Slam> open_slam(const Camera& camera, Options options, Mode mode
   }
   std::optional<SavedMap> map;
   if (!setup.map.empty()) map = load_map(setup.map);
-  auto segmenter = open_segmenter(setup, options, note);
-  auto vocabulary = open_vocabulary(setup, options, note);
+  auto segmenter = segmenter_of(setup, options, note);
+  auto vocabulary = vocabulary_of(setup, options, note);
   auto slam = std::make_unique<Slam>(camera, options, mode, std::move(segmenter), std::move(vocabulary));
   if (map) slam->load_map(std::move(*map));
   if (!options.keyframes.enabled) return slam;
   if (options.dense.enabled) slam->enable_dense_mapping();
   const bool dense_needs_it = options.dense.enabled && options.dense.restore && options.dense.remove;
   if ((setup.restore_keyframes || dense_needs_it) && options.dynamic_objects.is_on())
-    slam->enable_restoration(open_inpainter(setup, note), setup.on_restored);
+    slam->enable_restoration(inpainter_of(setup, note), setup.on_restored);
   return slam;
 }
 

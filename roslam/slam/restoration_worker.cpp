@@ -52,17 +52,17 @@ void RestorationWorker::restore(KeyframeId keyframe, const Job& job) {
   std::vector<KeyframeId> ids;
   for (const auto& [id, source] : sources_) ids.push_back(id);
   ids.push_back(keyframe);
-  const std::vector<KeyframePose> places = pose_lookup_(ids);
-  const auto sources = move_sources(ids, places);
-  const KeyframePose& placed = places.back();
-  const PosedImage view{job.frame.timestamp, placed.T_world_camera, job.frame.colour, job.frame.depth,
+  const std::vector<KeyframePose> poses = pose_lookup_(ids);
+  const auto sources = move_sources(ids, poses);
+  const KeyframePose& pose = poses.back();
+  const PosedImage view{job.frame.timestamp, pose.T_world_camera, job.frame.colour, job.frame.depth,
                         removed_area(job.dynamic_objects, job.frame.colour.size(), options_.margin)};
   const auto keep = [&] {
     if (auto source = restorer_.prepare_source(view)) sources_.insert_or_assign(keyframe, std::move(*source));
     while (sources_.size() > most_sources_) sources_.erase(sources_.begin());
   };
   try {
-    on_restored_({keyframe, job.frame, placed.T_world_camera, placed.submap,
+    on_restored_({keyframe, job.frame, pose.T_world_camera, pose.submap,
                   restorer_.restore(view, regions_of(job.dynamic_objects.objects), sources)});
   } catch (...) {
     keep();  // others can be filled from it all the same
@@ -73,12 +73,12 @@ void RestorationWorker::restore(KeyframeId keyframe, const Job& job) {
 
 // Puts the sources where they are by now. Those in the world of the last place, which is that of the target.
 std::vector<const SourceImage*> RestorationWorker::move_sources(const std::vector<KeyframeId>& ids,
-                                                                const std::vector<KeyframePose>& places) {
+                                                                const std::vector<KeyframePose>& poses) {
   std::vector<const SourceImage*> result;
   for (std::size_t i = 0; i + 1 < ids.size(); ++i) {
-    if (places[i].submap != places.back().submap) continue;
+    if (poses[i].submap != poses.back().submap) continue;
     SourceImage& source = sources_.at(ids[i]);
-    source.T_world_camera = places[i].T_world_camera;
+    source.T_world_camera = poses[i].T_world_camera;
     result.push_back(&source);
   }
   return result;

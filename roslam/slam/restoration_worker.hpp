@@ -66,7 +66,7 @@ class RestorationWorker {
   void work(KeyframeId keyframe, StageTimes& times);
   void restore(KeyframeId keyframe, const Job& job);
   std::vector<const SourceImage*> move_sources(const std::vector<KeyframeId>& ids,
-                                               const std::vector<KeyframePose>& places);
+                                               const std::vector<KeyframePose>& poses);
 
   RestorationOptions options_;
   Mode mode_;

@@ -113,11 +113,6 @@ SourceArguments flight_from_words(const std::string& name, const std::map<std::s
   return arguments;
 }
 
-std::shared_ptr<const Vocabulary> load_vocabulary(const std::string& file) {
-  const std::filesystem::path path = file.empty() ? find_vocabulary() : std::filesystem::path(file);
-  return path.empty() ? nullptr : std::make_shared<const Vocabulary>(Vocabulary::load(path));
-}
-
 std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments) {
   if (arguments.camera.empty()) {
     throw InputError(arguments.name +

@@ -9,7 +9,6 @@
 #include <optional>
 #include <string>
 
-#include "roslam/place_recognition/vocabulary.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/sensors/tum_source.hpp"
 #include "simulation/simulated_options.hpp"
@@ -42,9 +41,6 @@ std::map<std::string, std::string> flight_in_words(const SourceArguments& argume
 
 /// The inverse; an option not in words keeps its default. Throws InputError for a value that is no number.
 SourceArguments flight_from_words(const std::string& name, const std::map<std::string, std::string>& words);
-
-/// Loads a vocabulary, the shipped one if the name is empty; null if there is no shipped one.
-std::shared_ptr<const Vocabulary> load_vocabulary(const std::string& file);
 
 /// The two kinds of sources; the flight is empty for a recording. Both throw as open_source().
 std::optional<simulation::SimulatorOptions> simulated_flight(const SourceArguments& arguments);
