@@ -11,6 +11,7 @@ set(ROSLAM_PUBLIC_HEADERS
   geometry/trajectory.hpp
   sensors/frame_source.hpp
   sensors/image_file.hpp
+  sensors/timed_files.hpp
   sensors/tum_source.hpp
   features/descriptor.hpp
   features/feature_grid.hpp

@@ -1,8 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recording/run_folder.hpp"
 
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <ctime>
 #include <exception>
+#include <fstream>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "evaluation/trajectory_plot.hpp"
@@ -33,6 +40,47 @@ RunFolder::Result RunFolder::if_any(bool is_any, Result otherwise) {
 }
 
 namespace {
+// What a run writes.
+constexpr std::array kResults{"run.json",        "trajectory.txt", "keyframes.txt",     "map.ply",
+                              "map.roslam",      "dense.ply",      "dense.bt",          "trajectory.png",
+                              "groundtruth.txt", "report.html",    "descriptors.jsonl", "masks",
+                              "removal.jpg",     "removal.avi",    "restoration.jpg"};
+constexpr const char* kPrevious = "previous";
+
+const Path& created(const Path& folder) {
+  make_folder(folder);
+  return folder;
+}
+
+bool is_run(const Path& folder) {
+  const auto json = nlohmann::json::parse(std::ifstream(folder / "run.json"), nullptr, false);
+  return json.is_object() && json.contains("version") && json.contains("source");
+}
+
+// Time, process and the clock's finest digits: no two runs have the same.
+std::string new_id() {
+  const auto now = std::chrono::system_clock::now();
+  const std::time_t seconds = std::chrono::system_clock::to_time_t(now);
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y%m%dT%H%M%SZ", &utc);
+  const auto nanoseconds = now.time_since_epoch().count() % 1000000000;
+  return std::string(text.data()) + "-" + std::to_string(getpid()) + "-" + std::to_string(nanoseconds);
+}
+
+void move_away(const Path& folder, const Path& name) {
+  std::error_code error;
+  if (!std::filesystem::exists(folder / name, error)) return;
+  make_folder(folder / kPrevious);
+  std::filesystem::remove_all(folder / kPrevious / name, error);
+  std::filesystem::rename(folder / name, folder / kPrevious / name, error);
+  if (error) {
+    throw OutputError((folder / name).string() +
+                      ": left by an earlier run and cannot be moved away; choose another --out");
+  }
+}
+
 // The result of an earlier run must not be taken for one of this run.
 void remove_old(const std::filesystem::path& file) {
   std::error_code error;
@@ -54,17 +102,42 @@ void RunFolder::write_one(const Output& output, const std::filesystem::path& fil
   }
 }
 
-RunFolder::RunFolder(const std::filesystem::path& path) : path_(path) {
-  make_folder(path);
+RunFolder::RunFolder(const std::filesystem::path& path, bool overwrite) : path_(created(path)), lock_(path) {
   std::error_code error;
   if (std::filesystem::exists(path / "rgb.txt", error)) {
     throw OutputError(path.string() +
                       ": is a dataset, whose ground truth the results could overwrite; choose another --out");
   }
-  // Results of an earlier run stay until there are new ones.
+  for (const char* name : kResults) {
+    if (overwrite || is_run(path) || !std::filesystem::exists(path / name, error)) continue;
+    throw OutputError(
+        path.string() + ": holds " + name +
+        ", which roslam run did not write; choose another --out, or replace it with --overwrite");
+  }
+  // Results of an earlier run stay until this one begins.
   const auto probe = path / ".roslam_probe";
   write_file(probe, "\n");
   std::filesystem::remove(probe, error);
+}
+
+void RunFolder::begin(RunDescription& description, const Camera& camera) const {
+  std::error_code error;
+  for (const char* name : kResults) {
+    const bool is_input =
+        !description.map.empty() && std::filesystem::equivalent(path_ / name, description.map, error);
+    if (!is_input) move_away(path_, name);
+  }
+  description.id = new_id();
+  nlohmann::ordered_json json;
+  json["run"] = description.id;
+  json["finished"] = false;
+  json["version"] = description.version;
+  json["source"] = description.source;
+  if (!description.flight.empty()) json["flight"] = description.flight;
+  json["camera"] = nlohmann::ordered_json::parse(camera_to_json(camera));
+  json["camera"]["name"] = description.camera;
+  write_file(path_ / "run.json",
+             json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
 std::map<std::string, std::size_t> rejected_by_reason(const Slam& slam) {
@@ -102,7 +175,7 @@ void RunFolder::write(const Slam& slam, const RunResults& summary, const FrameSo
       {"dense.bt", [&](const Path& file) { summary.dense->occupancy->write(file); },
        if_any(has_occupancy, Result::kRemoved)},
       {"report.html",
-       [&](const Path& file) { replace_file(file, run_page(slam, summary, description, path_)); }},
+       [&](const Path& file) { replace_file(file, run_page(slam, summary, source, description, path_)); }},
   });
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "recording/output_folder.hpp"
 #include "recording/removal_record.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/slam/run.hpp"
@@ -30,6 +31,23 @@ struct RunDescription {
   std::string segmentation_model;             ///< weights file of the segmentation network; empty: not used
   std::string map;                            ///< file of the loaded map; empty: none
   std::map<std::string, std::string> flight;  ///< options of a simulated flight by name; empty: a recording
+  std::string id;                             ///< of the run; RunFolder::begin() makes one
+};
+
+/// What became of the frames of a source.
+struct FrameCounts {
+  std::size_t in_source = 0;  ///< that the source holds, whatever became of them
+  std::size_t processed = 0;
+  std::size_t with_pose = 0;                   ///< in trajectory.txt
+  std::size_t dropped = 0;                     ///< the tracker was too busy for
+  std::map<std::string, std::size_t> skipped;  ///< by source and pipeline, by reason in words
+
+  std::size_t all_skipped() const;
+  double pose_share() const;  ///< of the frames in the source, 0 to 1
+  bool is_complete() const { return with_pose == in_source; }
+
+  /// One line: frames with a pose of those in the source, and what became of the others.
+  std::string in_words() const;
 };
 
 /// Writes the results of a run to a folder:
@@ -43,10 +61,17 @@ struct RunDescription {
 ///   groundtruth.txt the true poses, if the source has them (TUM format)
 ///   run.json        effective options, counts, times of every stage, memory
 ///   report.html     figures and tables: trajectory, errors, times, images
+/// Results of an earlier run are moved to the subfolder previous/ when a run begins, so that they do not pass
+/// for those of a run that is killed. The folder is locked meanwhile.
 class RunFolder {
  public:
-  /// Creates the folder. Throws OutputError, before any work is lost, if it is not writable or is a dataset.
-  explicit RunFolder(const std::filesystem::path& path);
+  /// Creates and locks the folder. Throws OutputError, before any work is lost, if it is not writable, is a
+  /// dataset, is in use by another run, or, unless overwrite, holds files of these names that no run wrote.
+  explicit RunFolder(const std::filesystem::path& path, bool overwrite = false);
+
+  /// Moves the results of an earlier run away, gives the new run an id and writes a run.json that says that
+  /// it is not finished. A map.roslam that the run continues stays. Throws OutputError.
+  void begin(RunDescription& description, const Camera& camera) const;
 
   /// Writes trajectory, keyframes and map, the results that matter most, before those that take longer.
   /// Throws as write() does.
@@ -67,7 +92,10 @@ class RunFolder {
   void write_all(const std::vector<Output>& outputs) const;
 
   std::filesystem::path path_;
+  FolderLock lock_;
 };
+
+FrameCounts count_frames(const Slam& slam, const RunResults& summary, const FrameSource& source);
 
 /// Frames that the pipeline did not use, by reason in words.
 std::map<std::string, std::size_t> rejected_by_reason(const Slam& slam);
@@ -77,7 +105,10 @@ std::string run_report(const Slam& slam, const RunResults& summary, const FrameS
                        const RunDescription& description);
 
 /// The contents of report.html. folder: of the run's images.
-std::string run_page(const Slam& slam, const RunResults& summary, const RunDescription& description,
-                     const std::filesystem::path& folder);
+std::string run_page(const Slam& slam, const RunResults& summary, const FrameSource& source,
+                     const RunDescription& description, const std::filesystem::path& folder);
+
+/// camera as in run.json.
+std::string camera_to_json(const Camera& camera);
 
 }  // namespace roslam::recording

@@ -26,10 +26,11 @@ std::string megabytes(std::size_t bytes) { return fixed(static_cast<double>(byte
 
 class RunPage {
  public:
-  RunPage(const Slam& slam, const RunResults& summary, const RunDescription& description,
-          std::filesystem::path folder)
+  RunPage(const Slam& slam, const RunResults& summary, const FrameSource& source,
+          const RunDescription& description, std::filesystem::path folder)
       : slam_(slam),
         summary_(summary),
+        source_(source),
         description_(description),
         folder_(std::move(folder)),
         trajectory_(slam.trajectory()),
@@ -51,11 +52,13 @@ class RunPage {
     const auto row = [&](const std::string& name, const std::string& value) {
       rows.push_back({name, value});
     };
+    row("run", description_.id);
     row("camera", description_.camera);
     row("mode", slam_.mode() == Mode::kDeterministic ? "deterministic" : "real time");
-    row("frames tracked", std::to_string(trajectory_.size()) + " of " + std::to_string(slam_.frames()) +
-                              " (" + percent(trajectory_.size(), slam_.frames()) + ")");
-    if (slam_.mode() == Mode::kRealTime) row("frames dropped", std::to_string(summary_.dropped));
+    row("frames", count_frames(slam_, summary_, source_).in_words());
+    for (const auto& [warning, frames] : slam_.warnings()) row("warning", warning);
+    for (const auto& [note, number] : source_.notes())
+      row("note", note + (number > 1 ? " (" + std::to_string(number) + " times)" : ""));
     row("keyframes, landmarks",
         std::to_string(slam_.map().keyframe_count()) + ", " + std::to_string(slam_.map().landmark_count()));
     row("loops closed", std::to_string(slam_.loops().size()));
@@ -184,6 +187,7 @@ class RunPage {
 
   const Slam& slam_;
   const RunResults& summary_;
+  const FrameSource& source_;
   const RunDescription& description_;
   std::filesystem::path folder_;
   Trajectory trajectory_;
@@ -191,9 +195,9 @@ class RunPage {
 };
 }  // namespace
 
-std::string run_page(const Slam& slam, const RunResults& summary, const RunDescription& description,
-                     const std::filesystem::path& folder) {
-  return RunPage(slam, summary, description, folder).html();
+std::string run_page(const Slam& slam, const RunResults& summary, const FrameSource& source,
+                     const RunDescription& description, const std::filesystem::path& folder) {
+  return RunPage(slam, summary, source, description, folder).html();
 }
 
 }  // namespace roslam::recording

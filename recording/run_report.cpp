@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <exception>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "recording/process_info.hpp"
 #include "recording/run_folder.hpp"
@@ -45,24 +47,21 @@ Json frames_json(const Slam& slam, const RunResults& summary, const FrameSource&
     by_state[std::string(name_of(state))] = count;
     if (state == TrackingState::kTracking) tracked = count;
   }
-  std::size_t rejected = 0;
-  Json skipped = counts_json(source.skipped());
-  for (const auto& [reason, count] : rejected_by_reason(slam)) {
-    skipped[reason] = skipped.value(reason, std::size_t{0}) + count;
-    rejected += count;
-  }
-  const std::size_t arrived = slam.frames() + rejected + summary.dropped;
-  return {{"in_source", source.size().value_or(arrived)},
-          {"processed", slam.frames()},
+  const FrameCounts counts = count_frames(slam, summary, source);
+  return {{"in_source", counts.in_source},
+          {"processed", counts.processed},
           {"tracked", tracked},
           {"tracked_share",
-           slam.frames() == 0 ? 0.0 : static_cast<double>(tracked) / static_cast<double>(slam.frames())},
-          {"dropped", summary.dropped},
+           static_cast<double>(tracked) / static_cast<double>(std::max<std::size_t>(counts.in_source, 1))},
+          {"with_pose", counts.with_pose},
+          {"complete", counts.is_complete()},
+          {"dropped", counts.dropped},
           {"by_state", by_state},
-          {"skipped", skipped},
+          {"skipped", counts_json(counts.skipped)},
           {"clock_resets", slam.clock_resets()},
           {"without_depth", summary.without_depth},
-          {"skipped_depth", counts_json(source.skipped_depth())}};
+          {"skipped_depth", counts_json(source.skipped_depth())},
+          {"notes", counts_json(source.notes())}};
 }
 
 Json times_json(const StageTimes& times) {
@@ -147,6 +146,7 @@ Json map_json(const Slam& slam, const RunDescription& description) {
           {"recognised", description.map.empty() ? Json(nullptr) : Json(slam.found_in_loaded_map())},
           {"localise_only", !slam.options().keyframes.enabled},
           {"submaps", slam.map().submaps().size()},
+          {"submaps_dropped", slam.submaps_on_objects().size()},
           {"frames_in_other_submaps", in_other_submaps}};
 }
 
@@ -160,11 +160,53 @@ double path_length(const Trajectory& trajectory) {
 }
 }  // namespace
 
+std::string camera_to_json(const Camera& camera) { return camera_json(camera).dump(); }
+
+std::size_t FrameCounts::all_skipped() const {
+  return std::accumulate(skipped.begin(), skipped.end(), std::size_t{0},
+                         [](std::size_t sum, const auto& entry) { return sum + entry.second; });
+}
+
+double FrameCounts::pose_share() const {
+  return static_cast<double>(with_pose) / static_cast<double>(std::max<std::size_t>(in_source, 1));
+}
+
+std::string FrameCounts::in_words() const {
+  char share[16];
+  std::snprintf(share, sizeof(share), "%.1f", 100.0 * pose_share());
+  std::string words = "tracked " + std::to_string(with_pose) + " of " + std::to_string(in_source) +
+                      " frames of the source (" + share + " %)";
+  if (processed > with_pose) words += ", " + std::to_string(processed - with_pose) + " not tracked";
+  if (dropped > 0) words += ", " + std::to_string(dropped) + " dropped as the tracker was busy";
+  if (all_skipped() > 0) {
+    words += ", " + std::to_string(all_skipped()) + " skipped (";
+    for (const auto& [reason, number] : skipped)
+      words += (words.back() == '(' ? "" : "; ") + std::to_string(number) + " x " + reason;
+    words += ")";
+  }
+  const std::size_t seen = processed + dropped + all_skipped();
+  if (seen < in_source) words += ", " + std::to_string(in_source - seen) + " not read";
+  return words;
+}
+
+FrameCounts count_frames(const Slam& slam, const RunResults& summary, const FrameSource& source) {
+  FrameCounts counts;
+  counts.processed = slam.frames();
+  counts.with_pose = slam.trajectory().size();
+  counts.dropped = summary.dropped;
+  counts.skipped = source.skipped();
+  for (const auto& [reason, count] : rejected_by_reason(slam)) counts.skipped[reason] += count;
+  counts.in_source = source.size().value_or(counts.processed + counts.dropped + counts.all_skipped());
+  return counts;
+}
+
 std::string run_report(const Slam& slam, const RunResults& summary, const FrameSource& source,
                        const RunDescription& description) {
   const double per_second =
       summary.wall_seconds > 0.0 ? static_cast<double>(slam.frames()) / summary.wall_seconds : 0.0;
   Json json;
+  json["run"] = description.id;
+  json["finished"] = true;
   json["version"] = description.version;
   json["source"] = description.source;
   if (!description.flight.empty()) json["flight"] = description.flight;
@@ -172,6 +214,7 @@ std::string run_report(const Slam& slam, const RunResults& summary, const FrameS
   json["interrupted"] = summary.interrupted;
   json["error"] = summary.failure ? Json(message_of(summary.failure)) : Json(nullptr);
   json["frames"] = frames_json(slam, summary, source);
+  json["warnings"] = counts_json(slam.warnings());
   json["dynamic"] = dynamic_json(slam, summary, description);
   if (slam.restores())
     json["restoration"] = {{"dropped", slam.unrestored()},

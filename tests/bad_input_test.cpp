@@ -71,7 +71,7 @@ TEST_F(BadLists, ReadsListsFromWindowsWithCommentsAndBlankLines) {
   EXPECT_EQ(frames["without_depth"], 0);
 }
 
-TEST_F(BadLists, SkipsAndCountsTimesOutOfOrder) {
+TEST_F(BadLists, SkipsAndCountsCorruptTimes) {
   colour_[2].time = "99999.0";        // the clock jumps and comes back
   colour_[4].time = colour_[3].time;  // stands still
   colour_[6].time = "0.000001";       // jumps back
@@ -80,7 +80,8 @@ TEST_F(BadLists, SkipsAndCountsTimesOutOfOrder) {
   write_lists();
   const json frames = frames_of_run();
   EXPECT_EQ(frames["in_source"], kFrames);
-  EXPECT_EQ(frames["skipped"]["colour image out of the order of time"], 3);
+  EXPECT_EQ(frames["skipped"]["colour image with a time that does not fit the others"], 2);
+  EXPECT_EQ(frames["skipped"]["colour image with the time of another"], 1);
   EXPECT_EQ(frames["skipped"]["colour image without a time"], 2);
   EXPECT_EQ(frames["tracked"], 5);
   const Trajectory poses = trajectory();
@@ -151,7 +152,7 @@ TEST_F(BadImages, AllMissingIsAnErrorAndTheReportSaysSo) {
 }
 
 TEST_F(BadImages, AllOfAnotherSizeThanTheCameraIsAnErrorWithBothSizes) {
-  put(scratch_ / "small.yaml", "width: 320\nheight: 240\nfx: 190\nfy: 190\ncx: 160\ncy: 120\n");
+  put(scratch_ / "small.yaml", "width: 320\nheight: 240\nfx: 190\nfy: 190\ncx: 160\ncy: 120\ndepth_units_per_metre: 1000\n");
   expect_refused(
       run("", (scratch_ / "small.yaml").string()),
       {"10 x colour image is 640x480 but the camera 320x240 pixels", "check the images and --camera"});

@@ -53,11 +53,14 @@ TEST_F(BadSettings, CameraFileAndKeyAreNamed) {
                                                         {"distortion", "[.nan, 0]"},
                                                         {"distortion", "[1, 2, 3, 4, 5, 6]"},
                                                         {"distortion", "0.1"},
+                                                        {"distortion", "[0.1, 0.2, 0.3]"},
                                                         {"distortion", "[900, -900, 900, 900, 900]"},
                                                         {"distortion", "[-5, 0]"},
                                                         {"focal_length", "385"}}) {
     expect_refused(run("", file(camera_with(key, value))), {"settings.yaml", key});
   }
+  expect_refused(run("", file("width: 640\nheight: 480\nfx: 525\nfy: 525\ncx: 320\ncy: 240\n")),
+                 {"settings.yaml", "no 'depth_units_per_metre'", "1000", "5000"});
   expect_refused(run("", file(camera_with("model", "fisheye"))), {"settings.yaml", "fisheye", "use pinhole"});
   expect_refused(run("", file(camera_with("fx", "385\nfx: 400"))), {"settings.yaml", "'fx' is given twice"});
   expect_refused(run("", file("width: 640\n")), {"settings.yaml", "no 'height'; add it"});

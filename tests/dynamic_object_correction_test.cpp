@@ -274,7 +274,7 @@ class CorrectionWhileHidden : public testing::Test {
     tracked.reference = reference_;
     if (!is_hidden) last_measured_ = index;
     last_predicted_ = *tracked.T_camera_world;
-    front_end_->remember(tracked, *map_, observation);
+    front_end_->remember(tracked, *map_, observation, false);
     return share_of(observation.dynamic_objects.mask);
   }
 

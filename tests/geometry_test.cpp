@@ -86,7 +86,9 @@ class CameraFile : public testing::Test {
     std::ofstream(file) << text;
     return read_camera(file);
   }
-  const std::string good_ = "model: pinhole\nwidth: 640\nheight: 480\nfx: 500\nfy: 501\ncx: 320\ncy: 240\n";
+  const std::string good_ =
+      "model: pinhole\nwidth: 640\nheight: 480\nfx: 500\nfy: 501\ncx: 320\ncy: 240\n"
+      "depth_units_per_metre: 1000\n";
 };
 
 TEST_F(CameraFile, RoundTrips) {
@@ -102,8 +104,17 @@ TEST_F(CameraFile, RejectsAbsurdCalibration) {
     return text.replace(at, text.find('\n', at) - at, key + ": " + value);
   };
   EXPECT_NO_THROW(read(good_));
-  for (const auto& [key, value] : std::vector<std::pair<std::string, std::string>>{
-           {"fx", "0"}, {"fx", "-500"}, {"fy", ".nan"}, {"cx", ".inf"}, {"width", "0"}, {"height", "-480"}}) {
+  for (const auto& [key, value] :
+       std::vector<std::pair<std::string, std::string>>{{"fx", "0"},
+                                                        {"fx", "-500"},
+                                                        {"fy", ".nan"},
+                                                        {"cx", ".inf"},
+                                                        {"width", "0"},
+                                                        {"height", "-480"},
+                                                        {"cx", "640"},
+                                                        {"cy", "-1"},
+                                                        {"depth_units_per_metre", "0"},
+                                                        {"depth_units_per_metre", "-1"}}) {
     try {
       read(with(key, value));
       FAIL() << key << ": " << value << " was accepted";
@@ -113,8 +124,29 @@ TEST_F(CameraFile, RejectsAbsurdCalibration) {
           << error.what();
     }
   }
-  EXPECT_THROW(read(good_ + "depth_units_per_metre: 0\n"), CalibrationError);
   EXPECT_THROW(read(good_ + "distortion: [.nan, 0]\n"), CalibrationError);
+}
+
+TEST_F(CameraFile, HasNoDefaultForTheScaleOfDepth) {
+  const std::string without = good_.substr(0, good_.find("depth_units"));
+  try {
+    read(without);
+    FAIL() << "a camera file without depth_units_per_metre was accepted";
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    for (const char* word : {"depth_units_per_metre", "1000", "5000", "TUM", "RealSense"})
+      EXPECT_NE(text.find(word), std::string::npos) << word << ": " << text;
+  }
+  EXPECT_NO_THROW(Camera{}.validate()) << "depth in metres needs no unit";
+}
+
+TEST_F(CameraFile, RefusesDistortionThatCouldMeanTwoThings) {
+  EXPECT_THROW(read(good_ + "distortion: [0.1, -0.2, 0.01]\n"), InputError);
+  EXPECT_EQ(read(good_ + "distortion: [0.1, -0.2]\n").distortion,
+            (std::array<double, 5>{0.1, -0.2, 0, 0, 0}));
+  EXPECT_EQ(read(good_ + "distortion: [0.1, -0.2, 0.001, 0.002]\n").distortion,
+            (std::array<double, 5>{0.1, -0.2, 0.001, 0.002, 0}));
+  EXPECT_EQ(read(good_ + "distortion: []\n").distortion, (std::array<double, 5>{}));
 }
 
 TEST_F(CameraFile, RejectsWhatItDoesNotKnow) {

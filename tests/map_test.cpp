@@ -334,6 +334,21 @@ TEST_F(AppendedMap, KeepsPosesObservationsAndLoops) {
   expect_consistent(map_);
 }
 
+TEST_F(AppendedMap, LeavesOutSubmaps) {
+  const SubmapId without = other_.find(k_[0])->submap;
+  map_.append(other_, {without});
+  std::size_t others = 0;
+  for (const KeyframeId id : other_.keyframe_ids()) {
+    const bool is_left_out = other_.find(id)->submap == without;
+    EXPECT_EQ(copy_of(id).is_valid(), !is_left_out);
+    others += is_left_out ? 0 : 1;
+  }
+  EXPECT_EQ(map_.keyframe_count(), others);
+  EXPECT_EQ(map_.landmark_count(), 0U) << "all landmarks are of that submap";
+  EXPECT_TRUE(map_.loops().empty()) << "the loop leads to it";
+  expect_consistent(map_);
+}
+
 TEST_F(AppendedMap, MayBeEmpty) {
   const KeyframeId ours = add_keyframe(map_, 0.0);
   map_.append(Map({1.0F, 1.2F, 1.44F}));

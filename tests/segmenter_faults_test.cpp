@@ -2,10 +2,13 @@
 // A failing segmenter costs labels, not tracking; its faults are counted by name.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <stop_token>
+#include <thread>
 #include <utility>
 
 #include "roslam/common/error.hpp"
@@ -99,17 +102,43 @@ TEST_P(SegmenterFaults, ThatHangs) {
     bool is_open = false;
   };
   const auto gate = std::make_shared<Gate>();
-  expect_survived(std::make_shared<Scripted>([gate](const cv::Mat& image, int call) {
-                    if (call >= 3) {
-                      std::unique_lock lock(gate->mutex);
-                      gate->opened.wait(lock, [&] { return gate->is_open; });
-                    }
-                    return nothing(image);
-                  }),
-                  "does not answer", 0.5);
-  const std::scoped_lock lock(gate->mutex);
-  gate->is_open = true;
-  gate->opened.notify_all();
+  const auto segmenter = std::make_shared<Scripted>([gate](const cv::Mat& image, int call) {
+    if (call >= 3) {
+      std::unique_lock lock(gate->mutex);
+      gate->opened.wait(lock, [&] { return gate->is_open; });
+    }
+    return nothing(image);
+  });
+  const auto open = [&] {
+    const std::scoped_lock lock(gate->mutex);
+    gate->is_open = true;
+    gate->opened.notify_all();
+  };
+  if (GetParam() == Mode::kRealTime) {
+    expect_survived(segmenter, "does not answer", 0.5);
+    open();
+    return;
+  }
+  // A clock must not decide the result: the answer is waited for, well beyond the timeout, or until cancel().
+  for (const bool cancels : {false, true}) {
+    gate->is_open = false;
+    TumSource source(kFolder, *camera_preset("simulated"));
+    Options options;
+    options.threads.segmentation_timeout = 0.05;
+    Slam slam(source.camera(), options, GetParam(), segmenter);
+    std::stop_source stop;
+    std::jthread later([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(500));
+      cancels ? void(stop.request_stop()) : open();
+    });
+    const RunSummary summary = run_slam(source, slam, {}, stop.get_token());
+    later.join();
+    EXPECT_FALSE(summary.failure);
+    EXPECT_EQ(summary.interrupted, cancels);
+    EXPECT_EQ(slam.frames() < 10U, cancels) << slam.frames();
+    EXPECT_TRUE(cancels || slam.labelling_faults().empty());
+    open();
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, SegmenterFaults, testing::Values(Mode::kDeterministic, Mode::kRealTime),

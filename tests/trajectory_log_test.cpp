@@ -171,6 +171,23 @@ TEST_F(FrameLog, TheMainSubmapHasMostFrames) {
   EXPECT_EQ(log_.main_submap(map_), SubmapId{0});
 }
 
+TEST_F(FrameLog, ASubmapWhoseLandmarksAreOnObjectsIsFound) {
+  const KeyframeId on_person = add_keyframe(at(0.0), SubmapId{0});
+  const KeyframeId on_wall = add_keyframe(at(1.0), SubmapId{1});
+  const auto add_with = [&](std::size_t index, KeyframeId reference, int on_objects) {
+    TrackedFrame frame;
+    frame.state = TrackingState::kTracking;
+    frame.T_camera_world = at(0.0).inverse();
+    frame.reference = reference;
+    log_.add(frame, index, map_);
+    log_.add_evidence(frame, map_, {100, on_objects});
+  };
+  for (std::size_t i = 0; i < 10; ++i) add_with(i, on_person, i < 3 ? 0 : 90);
+  EXPECT_TRUE(log_.submaps_on_objects(map_).empty()) << "the only submap is the main one";
+  for (std::size_t i = 10; i < 30; ++i) add_with(i, on_wall, 20);
+  EXPECT_EQ(log_.submaps_on_objects(map_), std::set<SubmapId>{SubmapId{0}});
+}
+
 TEST_F(FrameLog, FramesWithoutAPoseDoNotMakeASubmapTheMainOne) {
   add_keyframe(at(0.0), SubmapId{0});
   const KeyframeId b = add_keyframe(at(0.0), SubmapId{1});

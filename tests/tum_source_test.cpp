@@ -71,6 +71,8 @@ class TumFolder : public testing::Test {
     camera_.fx = camera_.fy = 50.0;
     camera_.cx = 31.5;
     camera_.cy = 23.5;
+    camera_.depth_units_per_metre = 5000.0;
+    camera_.fps = 1.0;  // the times of the lists are whole seconds
   }
   void TearDown() override { fs::remove_all(folder_); }
 
@@ -119,35 +121,106 @@ TEST_F(TumFolder, DividesDepthByTheFactorOfTheCamera) {
   EXPECT_EQ(depth_to_metres(cv::Mat::zeros(1, 1, CV_16UC1), 1000.0).at<float>(0, 0), 0.0F);
 }
 
-TEST_F(TumFolder, DropsAsFewImagesAsLeaveTheTimesIncreasing) {
-  const auto times = [&](const std::string& words) {
-    std::string list;
-    for (const char c : words) list += std::string(1, c) + " colour.png\n";
-    write(list, "1 depth.png\n");
-    TumSource source(folder_, camera_);
-    std::string kept;
-    for (const auto& frame : read(source)) kept += std::to_string(std::lround(frame.timestamp));
-    const auto skipped = source.skipped();
-    const std::size_t dropped = skipped.empty() ? 0 : skipped.at("colour image out of the order of time");
-    EXPECT_EQ(dropped, words.size() - kept.size()) << words;
-    EXPECT_EQ(source.size(), words.size());
-    return kept;
-  };
-  EXPECT_EQ(times("12345"), "12345");
-  EXPECT_EQ(times("92345"), "2345");
-  EXPECT_EQ(times("12945"), "1245");
-  EXPECT_EQ(times("23145"), "2345");
-  EXPECT_EQ(times("12334"), "1234");
-  EXPECT_EQ(times("5555"), "5");
-  EXPECT_EQ(times("8912345"), "12345");
-  EXPECT_EQ(times("1"), "1");
-}
-
 TEST_F(TumFolder, OfRepeatedTimesTheFirstStays) {
   write("1 colour.png\n1 grey.png\n", "1 depth.png\n");
   TumSource source(folder_, camera_);
   EXPECT_EQ(source.next()->colour.at<cv::Vec3b>(0, 0), cv::Vec3b(10, 20, 30));
   EXPECT_FALSE(source.next());
+}
+
+std::string list_of(const std::vector<double>& times, const char* image) {
+  std::string list;
+  for (const double time : times) list += std::to_string(time) + " " + image + "\n";
+  return list;
+}
+
+TEST_F(TumFolder, SortsListsAndSaysSo) {
+  write("3 colour.png\n1 grey.png\n2 colour.png\n", "2 depth.png\n1 depth.png\n3 depth.png\n");
+  TumSource source(folder_, camera_);
+  const auto frames = read(source);
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].colour.at<cv::Vec3b>(0, 0), cv::Vec3b(77, 77, 77));
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(frames[i].timestamp, static_cast<double>(i + 1));
+    EXPECT_FALSE(frames[i].depth.empty());
+  }
+  EXPECT_EQ(source.notes().size(), 2u);
+  EXPECT_EQ(source.notes().count("rgb.txt was not in the order of time; sorted"), 1u);
+}
+
+TEST_F(TumFolder, BeginsASegmentWhereTheClockRestarts) {
+  const std::vector<double> times{11, 12, 13, 14, 15, 16, 11.5, 12.5, 13.5, 14.5, 15.5};
+  write(list_of(times, "colour.png"), list_of(times, "depth.png"));
+  TumSource source(folder_, camera_);
+  const auto frames = read(source);
+  ASSERT_EQ(frames.size(), times.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(frames[i].timestamp, times[i]);
+    EXPECT_EQ(frames[i].segment, i < 6 ? 0 : 1);
+    EXPECT_FALSE(frames[i].depth.empty());
+  }
+  EXPECT_EQ(source.notes().at("the clock restarts in rgb.txt; a new segment begins there"), 1u);
+  write(list_of(times, "colour.png"), list_of({11, 12, 13, 14, 15, 16}, "depth.png"));
+  EXPECT_THROW(TumSource(folder_, camera_), InputError);
+}
+
+TEST_F(TumFolder, ConvertsTimestampsOfOtherUnitsAndSaysSo) {
+  camera_.fps = 30.0;
+  for (const auto& [seconds, word] : {std::pair{1.0, ""},
+                                      {1e-3, "milliseconds"},
+                                      {1e-6, "microseconds"},
+                                      {1e-9, "nanoseconds"},
+                                      {1.0 / 30.0, "numbers of frames"}}) {
+    std::vector<double> times;
+    for (int i = 0; i < 10; ++i) times.push_back(std::round(i / 30.0 / seconds * 1e3) / 1e3);
+    write(list_of(times, "colour.png"), list_of(times, "depth.png"));
+    TumSource source(folder_, camera_);
+    const auto frames = read(source);
+    ASSERT_EQ(frames.size(), 10u);
+    for (std::size_t i = 0; i < 10; ++i)
+      EXPECT_NEAR(frames[i].timestamp, static_cast<double>(i) / 30.0, 1e-3) << word;
+    std::string notes;
+    for (const auto& [note, number] : source.notes()) notes += note;
+    EXPECT_NE(notes.find(word), std::string::npos) << notes;
+    EXPECT_EQ(notes.empty(), std::string(word).empty()) << notes;
+  }
+}
+
+TEST_F(TumFolder, TakesTheRateOfTheTimestampsWhereTheyContradictTheCamera) {
+  camera_.fps = 30.0;
+  std::vector<double> times;
+  for (int i = 0; i < 10; ++i) times.push_back(0.1 * i);
+  write(list_of(times, "colour.png"), list_of(times, "depth.png"));
+  TumSource source(folder_, camera_);
+  EXPECT_NEAR(source.camera().fps, 10.0, 1e-6);
+  EXPECT_EQ(source.notes().size(), 1u);
+}
+
+TEST_F(TumFolder, ReadsNamesWithBlanksQuotesAndBackslashes) {
+  fs::create_directories(folder_ / "my images");
+  fs::copy_file(folder_ / "colour.png", folder_ / "my images/a b.png");
+  fs::copy_file(folder_ / "colour.png", folder_ / "back\\slash.png");
+  const std::vector<std::string> spellings{
+      "my images/a b.png",  "\"my images/a b.png\"", "'my images/a b.png'",  "my\\ images/a\\ b.png",
+      "my images\\a b.png", "back\\slash.png",       "colour.png with more", "\"colour.png\" # comment"};
+  for (const auto& spelling : spellings) {
+    write("1 " + spelling + "\n", "1 depth.png\n");
+    TumSource source(folder_, camera_);
+    EXPECT_EQ(read(source).size(), 1u) << spelling;
+  }
+}
+
+TEST_F(TumFolder, CountsDepthAtTheEndOfTheRangeAsUnknown) {
+  cv::Mat raw(48, 64, CV_16UC1, cv::Scalar(2500));
+  raw(cv::Rect(0, 0, 8, 8)) = 65535;
+  cv::imwrite((folder_ / "depth.png").string(), raw);
+  write("1 colour.png\n", "1 depth.png\n");
+  TumSource source(folder_, camera_);
+  const auto frames = read(source);
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_EQ(frames[0].depth.at<float>(4, 4), 0.0F);
+  EXPECT_FLOAT_EQ(frames[0].depth.at<float>(40, 40), 0.5F);
+  EXPECT_EQ(source.notes().at("depth pixel at the end of the sensor's range, taken as unknown"), 64u);
 }
 
 TEST_F(TumFolder, RefusesWhatCannotBeRead) {
@@ -160,6 +233,9 @@ TEST_F(TumFolder, RefusesWhatCannotBeRead) {
     options.max_time_difference = bad;
     EXPECT_THROW(TumSource(folder_, camera_, options), OptionsError);
   }
+  Camera without_units = camera_;
+  without_units.depth_units_per_metre = 0.0;
+  EXPECT_THROW(TumSource(folder_, without_units), CalibrationError);
   camera_.fx = 0.0;
   EXPECT_THROW(TumSource(folder_, camera_), CalibrationError);
 }

@@ -12,6 +12,7 @@
 #include "apps/roslam/support/interrupt.hpp"
 #include "apps/roslam/support/output.hpp"
 #include "evaluation/plots/markdown_table.hpp"
+#include "recording/output_folder.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/common/write_file.hpp"
 #include "roslam/sensors/tum_source.hpp"
@@ -33,6 +34,7 @@ struct ComposeArguments {
   ComposerOptions options;
   std::array<double, 2> distance{1.3, 2.4};
   std::array<double, 3> up{};  // 0 0 0: estimated from the sequence
+  bool overwrite = false;
   bool json = false;
 };
 
@@ -140,6 +142,11 @@ void compose(ComposeArguments arguments) {
   if (!arguments.options.up) arguments.options.up = find_up(arguments.settings.folder, base, truth);
   const Composer composer(base, read_people(arguments), truth, arguments.options);
   protect_base(arguments.settings);
+  const recording::OutputFolder out(
+      arguments.settings.out, "compose",
+      {"rgb.txt", "depth.txt", "groundtruth.txt", "camera.yaml", "background.txt", "background_depth.txt",
+       "composition.json", "rgb", "depth", "labels", "instances"},
+      arguments.overwrite);
   for (const char* folder : {"rgb", "depth", "labels", "instances"})
     make_folder(arguments.settings.out / folder);
   Camera written = base;
@@ -220,6 +227,8 @@ void add_compose_command(CLI::App& program) {
       ->check(CLI::Range(1.0, 100000.0))
       ->capture_default_str();
   command->add_flag("--quiet", arguments->settings.quiet, "Print no progress");
+  command->add_flag("--overwrite", arguments->overwrite,
+                    "Replace files in the folder of --out that this command did not write");
   command->add_flag("--json", arguments->json, "Print the summary as one JSON object");
   command->callback([arguments] { compose(*arguments); });
 }

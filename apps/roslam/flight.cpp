@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/flight.hpp"
 
+#include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <iostream>
@@ -59,6 +60,8 @@ RunResults track(FrameSource& source, Slam& slam, std::optional<RemovalLog>& log
       source, slam,
       [&](const Frame& frame, const FrameResult& result) {
         if (log) log->add(frame, result);
+        for (const std::string& warning : result.warnings)
+          std::fprintf(stderr, "warning: %s\n", warning.c_str());
         if (start_up_seconds < 0.0 && result.T_world_camera) start_up_seconds = process_age();
         progress.show(result.index + 1, name_of(result.state));
       },
@@ -88,12 +91,10 @@ SlamSetup setup_of(const FlightArguments& arguments, const std::shared_ptr<Resto
   return setup;
 }
 
-// The results of an earlier run must not pass for those of this one.
-void remove_old_results(const std::filesystem::path& folder, const FlightArguments& arguments) {
+// Keyframes that an earlier run restored must not pass for those of this one.
+void remove_old_keyframes(const std::filesystem::path& folder, const FlightArguments& arguments) {
   RestoredFolder::require_apart(folder / "restored", arguments.source.name);
   RestoredFolder::remove_old(folder / "restored");
-  RemovalLog::remove_old(folder);
-  std::filesystem::remove(folder / kRestorationStrip);
 }
 
 void write_strip(const RestorationStrip& restorations, const std::filesystem::path& file) {
@@ -139,13 +140,17 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   const Mode mode = arguments.real_time ? Mode::kRealTime : Mode::kDeterministic;
   const auto restorations = std::make_shared<Restorations>();
   flight.slam = open_slam(camera, options, mode, setup_of(arguments, restorations));
-  const RunFolder folder(arguments.out);
-  flight.description = {arguments.source.name, arguments.source.camera,          version, {},
-                        arguments.map,         flight_in_words(arguments.source)};
+  const RunFolder folder(arguments.out, arguments.overwrite);
+  flight.description.source = arguments.source.name;
+  flight.description.camera = arguments.source.camera;
+  flight.description.version = version;
+  flight.description.map = arguments.map;
+  flight.description.flight = flight_in_words(arguments.source);
   if (flight.slam->options().dynamic_objects.labels)
     flight.description.segmentation_model =
         arguments.model.empty() ? find_segmentation_model().string() : arguments.model;
-  remove_old_results(folder.path(), arguments);
+  remove_old_keyframes(folder.path(), arguments);
+  folder.begin(flight.description, camera);
   if (arguments.restore && flight.slam->restores())
     restorations->folder.emplace(folder.path() / "restored", camera);
   std::optional<RemovalLog> log;

@@ -30,6 +30,7 @@ struct FlightArguments {
   bool restore = false;   ///< write the keyframes without what moves to the folder restored
   std::string models;     ///< folder of the networks that paint, in place of the shipped ones
   bool quiet = false;     ///< no progress
+  bool overwrite = false;  ///< replace files in the folder that no run wrote
 };
 
 /// A flight that came to its end.

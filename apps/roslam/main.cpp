@@ -13,6 +13,7 @@
 namespace {
 constexpr int kInputError = 1;
 constexpr int kUsageError = 2;
+constexpr int kIncomplete = 3;
 
 // An error is one line on stderr, for scripts; messages of other libraries may have several.
 std::string one_line(std::string text) {
@@ -46,6 +47,9 @@ int main(int argc, char** argv) {
     return 0;
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? 0 : kUsageError;
+  } catch (const roslam::app::IncompleteRun& error) {
+    std::cerr << "error: " << one_line(error.what()) << "\n";
+    return kIncomplete;
   } catch (const std::exception& error) {
     const bool is_memory = roslam::is_out_of_memory(error);
     std::cerr << "error: "

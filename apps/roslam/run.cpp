@@ -19,6 +19,7 @@ struct RunArguments {
   FlightArguments flight;
   bool print_config = false;
   bool json = false;
+  bool strict = false;
 };
 
 void print_map(const Slam& slam, bool has_map) {
@@ -30,10 +31,11 @@ void print_map(const Slam& slam, bool has_map) {
                 loop.keyframe.value, loop.matched_keyframe.value, loop.moved, loop.turned * 180.0 / M_PI,
                 loop.merges_submaps ? "; two submaps were merged" : "");
   }
+  const auto on_objects = slam.submaps_on_objects();
   for (const auto& [submap, frames] : slam.frames_in_other_submaps()) {
-    std::printf(
-        "note: %zu frames are in a submap that was not merged with the main one; trajectory.txt lacks them\n",
-        frames);
+    std::printf("note: %zu frames are in a submap that was %s; trajectory.txt lacks them\n", frames,
+                on_objects.count(submap) > 0 ? "mapped on movable objects and dropped"
+                                             : "not merged with the main one");
   }
   std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
               slam.map().landmark_count());
@@ -59,13 +61,25 @@ void print_restoration(const Flight& flight) {
     std::printf("note: keyframe not restored: %s (%zu times)\n", fault.c_str(), count);
 }
 
-void print_summary(const Slam& slam, const RunResults& summary, const std::string& folder, bool has_map) {
+void print_frames(const Slam& slam, const RunResults& summary, const FrameSource& source) {
+  const FrameCounts counts = count_frames(slam, summary, source);
+  constexpr double kFew = 0.9;
+  const bool is_few = counts.pose_share() < kFew && !summary.interrupted;
+  std::printf("%s%s%s\n", is_few ? "WARNING: " : "", counts.in_words().c_str(),
+              summary.interrupted ? ", interrupted" : "");
+  for (const auto& [warning, frames] : slam.warnings())
+    std::printf("WARNING: %s%s\n", warning.c_str(),
+                frames > 1 ? (" (" + std::to_string(frames) + " frames)").c_str() : "");
+  for (const auto& [note, number] : source.notes())
+    std::printf("note: %s%s\n", note.c_str(),
+                number > 1 ? (" (" + std::to_string(number) + " times)").c_str() : "");
+}
+
+void print_summary(const Flight& flight, const FlightArguments& arguments) {
+  const Slam& slam = *flight.slam;
+  const RunResults& summary = flight.summary;
   const auto times = slam.times().summary();
-  const std::size_t tracked = slam.trajectory().size();
-  std::printf(
-      "tracked %zu of %zu frames (%.1f %%), %zu dropped%s\n", tracked, slam.frames(),
-      100.0 * static_cast<double>(tracked) / static_cast<double>(std::max<std::size_t>(slam.frames(), 1)),
-      summary.dropped, summary.interrupted ? ", interrupted" : "");
+  print_frames(slam, summary, *flight.source);
   if (summary.removal && summary.removal->frames > 0) {
     const RemovalTally& tally = *summary.removal;
     std::printf("removed: %.1f %% of the image area on average",
@@ -81,13 +95,13 @@ void print_summary(const Slam& slam, const RunResults& summary, const std::strin
     std::printf("note: the clock of the source restarted (%zu times)\n", slam.clock_resets());
   for (const auto& [fault, count] : slam.loop_faults())
     std::printf("note: loop closing was switched off after it failed: %s\n", fault.c_str());
-  print_map(slam, has_map);
+  print_map(slam, !arguments.map.empty());
   if (summary.dense) print_dense(*summary.dense);
   if (const auto found = times.find("tracking"); found != times.end()) {
     std::printf("tracking: median %.1f ms, p95 %.1f ms of processor time per frame\n",
                 found->second.median_ms, found->second.p95_ms);
   }
-  std::printf("results: %s\n", folder.c_str());
+  std::printf("results: %s\n", arguments.out.c_str());
 }
 
 void check(const FlightArguments& arguments, const Options& options) {
@@ -113,6 +127,14 @@ void check(const FlightArguments& arguments, const Options& options) {
   }
 }
 
+// Results are written by then: exit code 3 tells a script that they are not what it wanted.
+void require_complete(const Flight& flight) {
+  const FrameCounts counts = count_frames(*flight.slam, flight.summary, *flight.source);
+  if (!counts.is_complete()) throw IncompleteRun("--strict: " + counts.in_words());
+  if (const auto warnings = flight.slam->warnings(); !warnings.empty())
+    throw IncompleteRun("--strict: " + warnings.begin()->first);
+}
+
 void execute(RunArguments arguments, const std::string& version) {
   const Options options = options_of(arguments.flight);
   if (arguments.print_config) {
@@ -129,9 +151,10 @@ void execute(RunArguments arguments, const std::string& version) {
     std::cout << nlohmann::json::parse(report).dump() << "\n";
   } else {
     if (arguments.flight.restore) print_restoration(flight);
-    print_summary(*flight.slam, flight.summary, arguments.flight.out, !arguments.flight.map.empty());
+    print_summary(flight, arguments.flight);
   }
   require_written_output();
+  if (arguments.strict) require_complete(flight);
 }
 }  // namespace
 
@@ -154,9 +177,13 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "  descriptors.jsonl masks/     dynamic objects of each frame and their masks\n"
       "  removal.jpg restoration.jpg  sample images: points removed; keyframes restored\n"
       "  run.json                     options, counts, processor times, memory\n"
-      "Ctrl-C ends the run early and writes the results so far (\"interrupted\" in run.json); a second one leaves out\n"
+      "Ctrl-C ends the run early and writes the results so far (\"interrupted\" in run.json); a second one "
+      "leaves out\n"
       "the dense map, a third ends the program at once.\n"
-      "Exit code: 0 success, 1 an error in the input, 2 wrong usage.");
+      "Results of an earlier run in RUN are moved to RUN/previous/.\n"
+      "Exit code: 0 success, 1 an error in the input, 2 wrong usage, 3 with --strict: results are written, "
+      "but not\n"
+      "every frame of the source has a pose, or the input is doubtful (a WARNING).");
   add_source_options(*command, arguments->flight.source);
   command->add_option("--out", arguments->flight.out,
                       "Folder the results are written to; made if it does not exist (required)");
@@ -200,6 +227,11 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command->add_option(
       "--models", arguments->flight.models,
       "Folder with the inpainting networks (roslam-restorer-*.onnx); default the shipped ones");
+  command->add_flag(
+      "--strict", arguments->strict,
+      "End with exit code 3 unless every frame of the source has a pose and nothing is doubtful");
+  command->add_flag("--overwrite", arguments->flight.overwrite,
+                    "Replace files in the folder of --out that no run wrote");
   command->add_flag("--quiet", arguments->flight.quiet, "Print no progress");
   command->add_flag("--json", arguments->json, "Print run.json on stdout as one JSON object");
   command->callback([arguments, version] { execute(*arguments, version); });

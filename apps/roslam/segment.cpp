@@ -18,6 +18,7 @@
 #include "apps/roslam/support/progress.hpp"
 #include "evaluation/plots/markdown_table.hpp"
 #include "evaluation/statistics.hpp"
+#include "recording/output_folder.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/common/write_file.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
@@ -39,6 +40,7 @@ struct SegmentArguments {
   InferenceBackend backend = InferenceBackend::kAutomatic;
   SegmenterOptions options;
   bool quiet = false;
+  bool overwrite = false;
   bool json = false;
 };
 
@@ -133,19 +135,23 @@ void print_summary(const SegmentArguments& arguments, const LabelStatistics& fou
   std::cout << "results: " << arguments.out.string() << "\n";
 }
 
-LabelStatistics label_all(const SegmentArguments& arguments, const LabelSet& set, ImageSource& source,
-                          Segmenter& segmenter, const std::stop_token& stop) {
+LabelStatistics label_all(const SegmentArguments& arguments, const recording::OutputFolder& out,
+                          const LabelSet& set, ImageSource& source, Segmenter& segmenter,
+                          const std::stop_token& stop) {
   LabelStatistics found;
   Progress progress(source.size(), arguments.quiet || arguments.json);
   while (!stop.stop_requested()) {
     const auto image = source.next();
     if (!image) break;
+    const fs::path labels = image->name + ".png";
+    const fs::path overlay = fs::path("overlay") / (image->name + ".jpg");
+    out.require_free(labels);
+    if (arguments.overlay) out.require_free(overlay);
     const Segmentation segmentation = segmenter.segment(image->image);
     found.add(segmentation);
-    write_image_fast(arguments.out / (image->name + ".png"), relabel(segmentation.labels, set));
+    write_image_fast(arguments.out / labels, relabel(segmentation.labels, set));
     if (arguments.overlay) {
-      write_image_fast(arguments.out / "overlay" / (image->name + ".jpg"),
-                  label_overlay(image->image, segmentation.labels));
+      write_image_fast(arguments.out / overlay, label_overlay(image->image, segmentation.labels));
     }
     progress.show(found.images, "labelled");
   }
@@ -160,8 +166,9 @@ void segment(const SegmentArguments& arguments) {
   PspnetSegmenter segmenter(model, arguments.options, arguments.backend);
   const auto source = open_images({arguments.inputs.begin(), arguments.inputs.end()});
   protect_inputs(arguments);
-  make_folder(arguments.overlay ? arguments.out / "overlay" : arguments.out);
-  const LabelStatistics found = label_all(arguments, set, *source, segmenter, interrupt.token());
+  const recording::OutputFolder out(arguments.out, "segment", {"labels.json"}, arguments.overwrite);
+  if (arguments.overlay) make_folder(arguments.out / "overlay");
+  const LabelStatistics found = label_all(arguments, out, set, *source, segmenter, interrupt.token());
   const bool interrupted = interrupt.token().stop_requested();
   if (found.images == 0 && !interrupted) {
     throw InputError(arguments.inputs.front() + ": no image could be labelled" + in_words(source->skipped()) +
@@ -218,6 +225,8 @@ void add_segment_command(CLI::App& program) {
                    "Inference backend; default auto: ONNX Runtime where built with it, else OpenCV")
       ->transform(CLI::CheckedTransformer(backends).description(""))
       ->type_name("auto|opencv|onnxruntime");
+  command->add_flag("--overwrite", arguments->overwrite,
+                    "Replace files in the folder of --out that this command did not write");
   command->add_flag("--quiet", arguments->quiet, "Print no progress");
   command->add_flag("--json", arguments->json, "Print the summary as one JSON object on stdout");
   command->callback([arguments] { segment(*arguments); });

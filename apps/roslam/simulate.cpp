@@ -11,6 +11,7 @@
 #include "apps/roslam/support/output.hpp"
 #include "apps/roslam/support/progress.hpp"
 #include "apps/roslam/support/tum_writer.hpp"
+#include "recording/output_folder.hpp"
 #include "roslam/common/write_file.hpp"
 #include "simulation/simulated_source.hpp"
 
@@ -29,6 +30,7 @@ struct SimulateArguments {
   std::string depth = "d455";
   std::size_t frames = 0;
   std::uint32_t seed = 1;
+  bool overwrite = false;
   bool json = false;
 };
 
@@ -67,7 +69,7 @@ void write_images(const fs::path& out, const std::string& name, const SimulatedV
   write_image_fast(out / "instances" / name, view.instances);
   write_image_fast(out / "background" / "rgb" / name, view.background_colour);
   write_image_fast(out / "background" / "depth" / name,
-              packed_depth(view.background_depth, camera.depth_units_per_metre));
+                   packed_depth(view.background_depth, camera.depth_units_per_metre));
 }
 
 void simulate(const SimulateArguments& arguments) {
@@ -77,6 +79,10 @@ void simulate(const SimulateArguments& arguments) {
   options.depth = *depth_model_from(arguments.depth);
   options.frames = arguments.frames;
   options.seed = arguments.seed;
+  const recording::OutputFolder out(arguments.out, "simulate",
+                                    {"rgb.txt", "depth.txt", "groundtruth.txt", "camera.yaml", "rgb", "depth",
+                                     "labels", "instances", "background"},
+                                    arguments.overwrite);
   for (const char* folder : {"rgb", "depth", "labels", "instances", "background/rgb", "background/depth"}) {
     make_folder(arguments.out / folder);
   }
@@ -148,6 +154,8 @@ void add_simulate_command(CLI::App& program) {
   command->add_option("--seed", arguments->seed, "Seed of the generated street and traffic")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  command->add_flag("--overwrite", arguments->overwrite,
+                    "Replace files in the folder of --out that this command did not write");
   command->add_flag("--json", arguments->json, "Print the summary as one JSON object on stdout");
   command->callback([arguments] { simulate(*arguments); });
 }

@@ -145,7 +145,9 @@ std::optional<std::vector<MovableObject>> DynamicObjectDetector::labelled_object
     return std::nullopt;
   }
   const double movable = cv::countNonZero(movable_mask(image));
-  if (movable > settings_.dynamic_objects.max_labelled_share * static_cast<double>(image.total())) {
+  is_everything_labelled_ =
+      movable > settings_.dynamic_objects.max_labelled_share * static_cast<double>(image.total());
+  if (is_everything_labelled_) {
     ++faults_["nearly everything is labelled as movable"];
     return std::nullopt;
   }
@@ -233,6 +235,7 @@ void DynamicObjectDetector::add_unlabelled(CellScene& scene) {
 DynamicObjects DynamicObjectDetector::compose_masks(const CellScene& scene) {
   DynamicObjects dynamic_objects;
   dynamic_objects.T_camera_world = pose_from_flow_;
+  dynamic_objects.is_everything_labelled = is_everything_labelled_;
   dynamic_objects.label_age = labelled_index_ ? static_cast<int>(current_.index - *labelled_index_) : -1;
   auto& objects = object_tracker_.objects();
   if (objects.empty()) return dynamic_objects;
@@ -277,6 +280,7 @@ void DynamicObjectDetector::reset() {
   past_.clear();
   history_.clear();
   object_tracker_.clear();
+  is_everything_labelled_ = false;
 }
 
 void DynamicObjectDetector::remember(const std::optional<SE3>& T_camera_world,

@@ -91,6 +91,7 @@ class DynamicObjectDetector {
   std::optional<SE3> pose_from_flow_;  // of the current frame
   std::deque<PastFrame> past_;
   std::optional<std::size_t> labelled_index_;  // of the newest frame whose labels were used
+  bool is_everything_labelled_ = false;        // by the newest labels
   std::map<std::string, std::size_t> faults_;
 };
 

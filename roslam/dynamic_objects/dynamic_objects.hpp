@@ -15,9 +15,10 @@ namespace roslam {
 struct ROSLAM_EXPORT DynamicObjects {
   cv::Mat mask;     ///< CV_8UC1, nonzero where no feature is extracted (eq. 11); empty = nothing is removed
   cv::Mat resting;  ///< CV_8UC1, nonzero on movable objects at rest, a part of mask; empty = none
-  std::vector<MovableObject> objects;  ///< the objects in the mask, not dilated
-  int label_age = -1;                  ///< frames since the labelled frame; -1 = none so far
-  std::optional<SE3> T_camera_world;   ///< camera pose by optical flow, if it was found
+  std::vector<MovableObject> objects;   ///< the objects in the mask, not dilated
+  bool is_everything_labelled = false;  ///< the newest labels were not used: nearly everything is movable
+  int label_age = -1;                   ///< frames since the labelled frame; -1 = none so far
+  std::optional<SE3> T_camera_world;    ///< camera pose by optical flow, if it was found
 };
 
 /// The pixels of removed objects (CV_8UC1, nonzero there), dilated by a margin (pixels), as outlines are

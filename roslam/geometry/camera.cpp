@@ -34,6 +34,10 @@ bool is_invertible(const Camera& camera) {
 bool positive(double value) { return std::isfinite(value) && value > 0.0; }
 }  // namespace
 
+std::string_view usual_depth_units() {
+  return "it is 1000 for depth in millimetres (RealSense, Azure Kinect, 7-Scenes) and 5000 for TUM RGB-D";
+}
+
 void Camera::validate() const {
   const std::string got = "; check the camera file or use a preset";
   require(width >= 32 && width <= 16384,
@@ -44,16 +48,17 @@ void Camera::validate() const {
   require(positive(fy), "fy must be positive, got " + std::to_string(fy) + got);
   require(fx / fy > 0.1 && fx / fy < 10.0, "fx and fy differ more than tenfold" + got);
   require(fx > 0.05 * width && fx < 100.0 * width, "fx is implausible for the image width" + got);
-  require(std::isfinite(cx) && cx > -width && cx < 2 * width, "cx lies far outside the image" + got);
-  require(std::isfinite(cy) && cy > -height && cy < 2 * height, "cy lies far outside the image" + got);
+  // Outside the image it is that of a larger image.
+  require(cx > 0.0 && cx < width, "cx must lie within the image, got " + std::to_string(cx) + got);
+  require(cy > 0.0 && cy < height, "cy must lie within the image, got " + std::to_string(cy) + got);
   for (const double k : distortion) {
     require(std::isfinite(k) && std::abs(k) < 1000.0,
             "distortion must be five finite numbers k1 k2 p1 p2 k3" + got);
   }
   require(is_invertible(*this), "distortion cannot be inverted over the image" + got);
-  require(positive(depth_units_per_metre),
-          "depth_units_per_metre must be positive (5000 for TUM, 1000 for millimetres), got " +
-              std::to_string(depth_units_per_metre));
+  require(depth_units_per_metre == 0.0 || positive(depth_units_per_metre),
+          "depth_units_per_metre must be positive, got " + std::to_string(depth_units_per_metre) + "; " +
+              std::string(usual_depth_units()));
   require(positive(fps) && fps <= 10000.0, "fps must be positive, got " + std::to_string(fps));
 }
 

@@ -23,10 +23,11 @@ struct ROSLAM_EXPORT Camera {
   double cx = 319.5;                                ///< pixels
   double cy = 239.5;                                ///< pixels
   std::array<double, 5> distortion{0, 0, 0, 0, 0};  ///< k1, k2, p1, p2, k3
-  double depth_units_per_metre = 5000.0;            ///< value of a 16-bit depth image at one metre
-  double fps = 30.0;                                ///< frames a second
+  double depth_units_per_metre = 0.0;  ///< value of a 16-bit depth image at one metre; 0: not set
+  double fps = 30.0;                   ///< frames a second
 
-  /// Throws CalibrationError naming the field that is out of range.
+  /// Throws CalibrationError naming the field that is out of range. depth_units_per_metre may be 0 (not set):
+  /// depth in metres needs none, and a source of 16-bit depth refuses it.
   void validate() const;
 
   bool has_distortion() const;
@@ -59,8 +60,13 @@ ROSLAM_EXPORT std::vector<std::string> camera_preset_names();
 /// The preset of that name, or nothing.
 ROSLAM_EXPORT std::optional<Camera> camera_preset(std::string_view name);
 
-/// Reads a camera file (YAML: model, width, height, fx, fy, cx, cy, distortion, depth_units_per_metre, fps).
-/// Throws InputError for a missing or malformed file or an unknown key, CalibrationError as validate does.
+/// The usual values of depth_units_per_metre, as the remedy of an error message.
+ROSLAM_EXPORT std::string_view usual_depth_units();
+
+/// Reads a camera file (YAML: model, width, height, fx, fy, cx, cy, distortion, depth_units_per_metre, fps);
+/// only model, distortion and fps (30) have defaults. distortion: k1 k2 p1 p2 k3, k1 k2 p1 p2, k1 k2, or
+/// none. Throws InputError for a missing or malformed file or an unknown key, CalibrationError as validate
+/// does.
 ROSLAM_EXPORT Camera read_camera(const std::filesystem::path& file);
 
 /// A preset name or a camera file. Throws as read_camera does.

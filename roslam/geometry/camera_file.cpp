@@ -103,10 +103,22 @@ Camera read_camera(const std::filesystem::path& file) {
   camera.cx = read.get<double>("cx");
   camera.cy = read.get<double>("cy");
   const auto coefficients = read.get<std::vector<double>>("distortion", {});
-  if (coefficients.size() > 5)
-    throw InputError(file.string() + ": distortion has more than 5 values k1 k2 p1 p2 k3");
+  // Three could be k1 k2 p1 as well as k1 k2 k3.
+  if (const std::size_t n = coefficients.size(); n != 0 && n != 2 && n != 4 && n != 5) {
+    throw InputError(file.string() + ": distortion has " + std::to_string(n) +
+                     " values; give k1 k2 p1 p2 k3, with 0 for those that are not known");
+  }
   std::copy(coefficients.begin(), coefficients.end(), camera.distortion.begin());
-  camera.depth_units_per_metre = read.get<double>("depth_units_per_metre", camera.depth_units_per_metre);
+  // No default: a wrong one would scale the whole map.
+  if (!node["depth_units_per_metre"]) {
+    throw InputError(file.string() + ": camera file has no 'depth_units_per_metre'; add it: " +
+                     std::string(usual_depth_units()));
+  }
+  camera.depth_units_per_metre = read.get<double>("depth_units_per_metre");
+  if (camera.depth_units_per_metre == 0.0) {
+    throw CalibrationError(file.string() + ": depth_units_per_metre must not be 0; " +
+                           std::string(usual_depth_units()));
+  }
   camera.fps = read.get<double>("fps", camera.fps);
   try {
     camera.validate();

@@ -41,11 +41,15 @@ LandmarkId Map::insert(Landmark landmark) {
   return landmarks_.back()->id;
 }
 
-void Map::append(const Map& other) {
+void Map::append(const Map& other, const std::set<SubmapId>& without) {
+  std::vector<KeyframeId> theirs_kept;
+  for (const KeyframeId id : other.keyframe_ids()) {
+    if (without.count(other.find(id)->submap) == 0) theirs_kept.push_back(id);
+  }
   // Submaps and sessions are renumbered without gaps, too.
   std::map<SubmapId, SubmapId> submap_of;
   std::map<std::uint32_t, std::uint32_t> session_of;
-  for (const KeyframeId id : other.keyframe_ids()) {
+  for (const KeyframeId id : theirs_kept) {
     submap_of[other.find(id)->submap];
     session_of[other.find(id)->session];
   }
@@ -54,7 +58,7 @@ void Map::append(const Map& other) {
   for (auto& [theirs, ours] : submap_of) ours = SubmapId{next_submap++};
   for (auto& [theirs, ours] : session_of) ours = next_session++;
   std::vector<KeyframeId> id_of(other.keyframe_slots());
-  for (const KeyframeId id : other.keyframe_ids()) {
+  for (const KeyframeId id : theirs_kept) {
     Keyframe keyframe = *other.find(id);
     keyframe.submap = submap_of.at(keyframe.submap);
     keyframe.session = session_of.at(keyframe.session);
@@ -62,13 +66,16 @@ void Map::append(const Map& other) {
   }
   for (const LandmarkId id : other.landmark_ids()) {
     Landmark landmark = *other.find(id);
+    if (without.count(other.submap_of(landmark)) > 0) continue;
     for (auto& observation : landmark.observations)
       observation.keyframe = id_of[observation.keyframe.index()];
     landmark.created_by = id_of[other.T_camera_anchor(landmark.created_by).first.index()];
     insert(std::move(landmark));
   }
-  for (const auto& loop : other.loops())
+  for (const auto& loop : other.loops()) {
+    if (!id_of[loop.from.index()].is_valid() || !id_of[loop.to.index()].is_valid()) continue;
     add_loop(id_of[loop.from.index()], id_of[loop.to.index()], loop.T_to_from);
+  }
 }
 
 std::vector<SubmapId> Map::submaps() const {

@@ -83,7 +83,8 @@ class ROSLAM_EXPORT Map {
   LandmarkId insert(Landmark landmark);
 
   /// Inserts all elements of another map, with new ids without gaps, as separate submaps and sessions.
-  void append(const Map& other);
+  /// without: submaps of the other that are left out.
+  void append(const Map& other, const std::set<SubmapId>& without = {});
 
   /// Adds an observation. Does nothing and returns false if the point observes another landmark, or if the
   /// keyframe observes this landmark already.

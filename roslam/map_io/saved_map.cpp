@@ -30,11 +30,12 @@ std::string in_words(const Camera& camera) {
 }
 }  // namespace
 
-SavedMap SavedMap::of(const Camera& camera, const Map& map, const KeyframeDatabase* database) {
+SavedMap SavedMap::of(const Camera& camera, const Map& map, const KeyframeDatabase* database,
+                      const std::set<SubmapId>& without) {
   SavedMap saved;
   saved.camera = camera;
   saved.map = Map({map.scales().begin(), map.scales().end()});
-  saved.map.append(map);
+  saved.map.append(map, without);
   // Landmarks that bundle adjustment moved out of range are useless, and load_map would refuse them.
   for (const LandmarkId id : saved.map.landmark_ids()) {
     const Eigen::Vector3d& position = saved.map.find(id)->position;
@@ -43,6 +44,7 @@ SavedMap SavedMap::of(const Camera& camera, const Map& map, const KeyframeDataba
   if (database == nullptr) return saved;
   saved.vocabulary = database->vocabulary().fingerprint();
   for (const KeyframeId id : map.keyframe_ids()) {
+    if (without.count(map.find(id)->submap) > 0) continue;
     const BagOfWords* bag = database->find(id);
     saved.words.push_back(bag != nullptr ? *bag : BagOfWords{});
   }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,7 +26,9 @@ struct ROSLAM_EXPORT SavedMap {
   std::vector<BagOfWords> words;  ///< by keyframe id, may be fewer
 
   /// A copy of all existing elements, with ids without gaps. database: source of the words, may be null.
-  static SavedMap of(const Camera& camera, const Map& map, const KeyframeDatabase* database);
+  /// without: submaps that are left out.
+  static SavedMap of(const Camera& camera, const Map& map, const KeyframeDatabase* database,
+                     const std::set<SubmapId>& without = {});
 
   /// Throws InputError if the map was made with another camera or with other pyramid levels, so that its
   /// frames cannot be matched with it.

@@ -17,6 +17,7 @@ namespace roslam {
 struct ROSLAM_EXPORT Frame {
   std::size_t index = 0;   ///< position in the source, counted from 0; skipped frames leave gaps
   double timestamp = 0.0;  ///< seconds, as given by the source
+  int segment = 0;         ///< restarts of the source's clock before this frame, as far as the source knows
   cv::Mat colour;          ///< CV_8UC3, BGR, raw (distorted)
   cv::Mat depth;           ///< CV_32FC1, metres along the optical axis, 0 = unknown; registered to colour
   cv::Mat labels;          ///< CV_8UC1 class of each pixel if the source knows it, else empty
@@ -32,7 +33,7 @@ class ROSLAM_EXPORT FrameSource {
   FrameSource& operator=(const FrameSource&) = delete;
   virtual ~FrameSource() = default;
 
-  /// The next frame, or nothing at the end. Timestamps strictly increase, unless the clock of a live source restarts.
+  /// The next frame, or nothing at the end. Timestamps strictly increase, unless the clock restarts.
   virtual std::optional<Frame> next() = 0;
 
   /// Makes a waiting next() return nothing soon, such as when a camera has stalled. Safe from any thread.
@@ -45,6 +46,9 @@ class ROSLAM_EXPORT FrameSource {
 
   /// Frames skipped so far, by reason in words.
   virtual std::map<std::string, std::size_t> skipped() const { return {}; }
+
+  /// What the source found out about its data and how often, in words, such as a list that was not sorted.
+  virtual std::map<std::string, std::size_t> notes() const { return {}; }
 
   /// Depth images that could not be used so far, by reason in words; their frames have an empty depth.
   virtual std::map<std::string, std::size_t> skipped_depth() const { return {}; }

@@ -2,14 +2,8 @@
 #include "roslam/sensors/tum_source.hpp"
 
 #include <algorithm>
-#include <cctype>
-#include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
-#include <limits>
-#include <sstream>
-#include <string_view>
+#include <cstdio>
 #include <utility>
 
 #include "roslam/common/error.hpp"
@@ -18,90 +12,17 @@
 namespace roslam {
 
 namespace {
-struct List {
-  std::vector<TimedFile> entries;
-  std::size_t without_time = 0;  // lines whose time is not a number
-};
-
-// Excerpt of a line for an error message: short and without control characters.
-std::string excerpt(const std::string& line) {
-  constexpr std::size_t kLength = 60;
-  std::string shown = line.substr(0, kLength);
-  std::replace_if(
-      shown.begin(), shown.end(), [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; },
-      '?');
-  return line.size() > kLength ? shown + "..." : shown;
-}
-
-// std::from_chars, unlike streams, does not depend on the locale and reads "nan" and "inf".
-std::optional<double> parse_time(const std::string& word) {
-  double time = 0.0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), time);
-  if (end != word.data() + word.size()) return std::nullopt;
-  if (error == std::errc::result_out_of_range) return std::numeric_limits<double>::quiet_NaN();
-  return error == std::errc() ? std::make_optional(time) : std::nullopt;
-}
-
-List read_list(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in || std::filesystem::is_directory(file)) {
-    throw InputError(file.string() +
-                     ": cannot open it; a TUM RGB-D folder holds rgb.txt, depth.txt and the images "
-                     "they name");
-  }
-  List list;
-  std::string line;
-  for (std::size_t number = 1; std::getline(in, line); ++number) {
-    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // some editors put it before the first line
-    if (number == 1 && line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
-    std::istringstream fields(line);
-    std::string time_word;
-    std::string image;
-    fields >> time_word >> image;
-    if (time_word.empty() || time_word.front() == '#') continue;
-    const auto time = parse_time(time_word);
-    if (!time || image.empty()) {
-      throw InputError(file.string() + ":" + std::to_string(number) + ": expected 'timestamp file', got '" +
-                       excerpt(line) + "'; correct or remove the line");
-    }
-    if (std::isfinite(*time)) {
-      list.entries.push_back({*time, image});
-    } else {
-      ++list.without_time;
-    }
-  }
-  if (list.entries.empty()) throw InputError(file.string() + ": names no image; is the dataset complete?");
-  return list;
-}
-
-// Drops the fewest entries that make the times strictly increasing and returns how many. A greedy filter
-// would lose every entry after a single time far in the future.
-std::size_t drop_out_of_order(std::vector<TimedFile>& entries) {
-  // Longest increasing subsequence: last_of[n] is the last entry of the one of length n + 1 ending earliest.
-  std::vector<std::size_t> last_of;
-  std::vector<std::size_t> before(entries.size());
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    const auto at = std::lower_bound(last_of.begin(), last_of.end(), entries[i].timestamp,
-                                     [&](std::size_t e, double time) { return entries[e].timestamp < time; });
-    if (at != last_of.begin()) before[i] = *std::prev(at);
-    if (at == last_of.end()) {
-      last_of.push_back(i);
-    } else if (entries[*at].timestamp > entries[i].timestamp) {  // of equal times the first is kept
-      *at = i;
-    }
-  }
-  std::vector<TimedFile> kept(last_of.size());
-  for (std::size_t n = kept.size(), i = last_of.back(); n > 0; i = before[i]) kept[--n] = entries[i];
-  const std::size_t dropped = entries.size() - kept.size();
-  entries = std::move(kept);
-  return dropped;
-}
-
 std::string size_in_words(const cv::Size& size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-void count(std::map<std::string, std::size_t>& counts, const char* reason, std::size_t number) {
+std::string in_words(double fps) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.3g", fps);
+  return text;
+}
+
+void count(std::map<std::string, std::size_t>& counts, const std::string& reason, std::size_t number) {
   if (number > 0) counts[reason] += number;
 }
 }  // namespace
@@ -113,10 +34,12 @@ void TumOptions::validate() const {
   }
 }
 
-std::vector<TimedFile> read_tum_list(const std::filesystem::path& file) { return read_list(file).entries; }
+std::vector<TimedFile> read_tum_list(const std::filesystem::path& file) {
+  return read_timed_files(file).entries;
+}
 
 std::vector<int> associate_by_time(const std::vector<TimedFile>& colour, const std::vector<TimedFile>& depth,
-                           double max_time_difference) {
+                                   double max_time_difference) {
   struct Pair {
     double difference;
     std::size_t colour;
@@ -161,16 +84,75 @@ TumSource::TumSource(const std::filesystem::path& folder, const Camera& camera, 
   if (!std::filesystem::is_directory(folder)) {
     throw InputError(folder.string() + ": no such folder; give a TUM RGB-D dataset or simulated:street");
   }
-  List colour = read_list(folder / "rgb.txt");
-  List depth = read_list(folder / "depth.txt");
+  if (!(camera.depth_units_per_metre > 0.0)) {
+    throw CalibrationError("camera calibration: depth_units_per_metre is not set; " +
+                           std::string(usual_depth_units()));
+  }
+  open_lists();
+  pair_with_depth(options.max_time_difference);
+}
+
+void TumSource::open_lists() {
+  TimedFileList colour = read_timed_files(folder_ / "rgb.txt");
+  TimedFileList depth = read_timed_files(folder_ / "depth.txt");
   size_ = colour.entries.size() + colour.without_time;
-  count(skipped_, "colour image without a time", colour.without_time);
-  count(skipped_, "colour image out of the order of time", drop_out_of_order(colour.entries));
-  count(skipped_depth_, "depth image without a time", depth.without_time);
-  count(skipped_depth_, "depth image out of the order of time", drop_out_of_order(depth.entries));
-  colour_ = std::move(colour.entries);
-  depth_ = std::move(depth.entries);
-  depth_of_colour_ = associate_by_time(colour_, depth_, options.max_time_difference);
+  colour_ = ordered("rgb.txt", "colour image", std::move(colour), skipped_);
+  depth_ = ordered("depth.txt", "depth image", std::move(depth), skipped_depth_);
+  const double interval = median_interval(colour_);
+  if (interval <= 0.0) return;
+  constexpr double kContradiction = 1.5;
+  const double fps = 1.0 / interval;
+  if (fps < camera_.fps * kContradiction && fps > camera_.fps / kContradiction) return;
+  ++notes_["the camera has " + in_words(camera_.fps) + " images a second, the timestamps " + in_words(fps) +
+           "; the timestamps are taken"];
+  camera_.fps = fps;
+}
+
+// The lines of a list in seconds and in order.
+std::vector<TimedFile> TumSource::ordered(const char* name, const char* kind, TimedFileList list,
+                                          std::map<std::string, std::size_t>& skipped) {
+  const TimeUnit unit = time_unit_of(list.entries, camera_.fps);
+  if (unit.seconds != 1.0) {
+    ++notes_[std::string("timestamps of ") + name + " are " + std::string(unit.name) +
+             " by the camera's fps; converted to seconds"];
+    for (auto& entry : list.entries) entry.timestamp *= unit.seconds;
+  }
+  OrderedFiles files = in_order_of_time(std::move(list.entries));
+  if (!files.was_sorted) ++notes_[std::string(name) + " was not in the order of time; sorted"];
+  if (files.restarts > 0)
+    notes_[std::string("the clock restarts in ") + name + "; a new segment begins there"] +=
+        static_cast<std::size_t>(files.restarts);
+  count(skipped, std::string(kind) + " without a time", list.without_time);
+  count(skipped, std::string(kind) + " with the time of another", files.repeated);
+  count(skipped, std::string(kind) + " with a time that does not fit the others", files.implausible);
+  return std::move(files.entries);
+}
+
+void TumSource::pair_with_depth(double max_time_difference) {
+  const auto segments = [](const std::vector<TimedFile>& files) { return files.back().segment + 1; };
+  if (segments(colour_) != segments(depth_)) {
+    throw InputError(folder_.string() + ": the clock restarts " + std::to_string(segments(colour_) - 1) +
+                     " times in rgb.txt and " + std::to_string(segments(depth_) - 1) +
+                     " times in depth.txt; split the recording where it restarts");
+  }
+  for (int segment = 0; segment < segments(colour_); ++segment) {
+    const auto part = [segment](const std::vector<TimedFile>& files) {
+      const auto [begin, end] =
+          std::equal_range(files.begin(), files.end(), TimedFile{0.0, {}, segment},
+                           [](const TimedFile& a, const TimedFile& b) { return a.segment < b.segment; });
+      return std::pair(static_cast<int>(begin - files.begin()), std::vector<TimedFile>(begin, end));
+    };
+    const auto [first_depth, depth] = part(depth_);
+    for (const int index : associate_by_time(part(colour_).second, depth, max_time_difference))
+      depth_of_colour_.push_back(index < 0 ? -1 : first_depth + index);
+  }
+}
+
+std::map<std::string, std::size_t> TumSource::notes() const {
+  auto notes = notes_;
+  if (bits_ > 8) ++notes["colour images of " + std::to_string(bits_) + " bits a channel were reduced to 8"];
+  count(notes, "depth pixel at the end of the sensor's range, taken as unknown", saturated_depth_pixels_);
+  return notes;
 }
 
 std::optional<Frame> TumSource::next() {
@@ -181,7 +163,7 @@ std::optional<Frame> TumSource::next() {
 }
 
 std::optional<Frame> TumSource::read(std::size_t index) {
-  const ImageFile colour = read_colour_image(folder_ / colour_[index].file);
+  const ImageFile colour = read_colour_image(folder_ / colour_[index].file, bits_);
   if (!colour.error.empty()) {
     ++skipped_["colour image " + colour.error];
     return std::nullopt;
@@ -192,8 +174,10 @@ std::optional<Frame> TumSource::read(std::size_t index) {
                size_in_words(expected) + " pixels"];
     return std::nullopt;
   }
+  bits_ = std::max(bits_, colour.bits);
   Frame frame;
   frame.index = index;
+  frame.segment = colour_[index].segment;
   frame.timestamp = colour_[index].timestamp;
   frame.colour = colour.image;
   frame.depth = read_depth_for(index, colour.image.size());
@@ -216,7 +200,10 @@ cv::Mat TumSource::read_depth_for(std::size_t index, const cv::Size& colour_size
                      size_in_words(colour_size) + " pixels"];
     return {};
   }
-  return depth_to_metres(depth.image, camera_.depth_units_per_metre);
+  std::size_t saturated = 0;
+  cv::Mat metres = depth_to_metres(depth.image, camera_.depth_units_per_metre, &saturated);
+  saturated_depth_pixels_ += saturated;
+  return metres;
 }
 
 }  // namespace roslam

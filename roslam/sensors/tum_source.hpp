@@ -9,6 +9,7 @@
 
 #include "roslam/common/export.hpp"
 #include "roslam/sensors/frame_source.hpp"
+#include "roslam/sensors/timed_files.hpp"
 
 namespace roslam {
 
@@ -19,29 +20,28 @@ struct ROSLAM_EXPORT TumOptions {
   void validate() const;
 };
 
-/// One line of rgb.txt or depth.txt.
-struct ROSLAM_EXPORT TimedFile {
-  double timestamp = 0.0;      ///< seconds
-  std::filesystem::path file;  ///< relative to the dataset folder
-};
-
-/// The files that an rgb.txt or depth.txt names, as listed; lines whose time is not finite are ignored.
-/// Throws InputError if the file is missing, malformed or names no image.
+/// The files that an rgb.txt or depth.txt names, as listed; lines whose time is not finite are ignored. File
+/// names may be quoted and hold blanks, escaped by a backslash or not, and backslashes in place of slashes.
+/// Throws InputError if the list is missing, malformed or names no image.
 ROSLAM_EXPORT std::vector<TimedFile> read_tum_list(const std::filesystem::path& file);
 
 /// Pairs each colour image with the depth image nearest in time; each depth image is used once. The result
 /// holds an index into depth or -1, one for each colour image. Both lists must be sorted by time.
 ROSLAM_EXPORT std::vector<int> associate_by_time(const std::vector<TimedFile>& colour,
-                                         const std::vector<TimedFile>& depth, double max_time_difference);
+                                                 const std::vector<TimedFile>& depth,
+                                                 double max_time_difference);
 
 /// A folder in the TUM RGB-D format: rgb.txt, depth.txt and the images they name (PNG or JPEG; depth 16-bit).
-/// A colour image without a depth image near in time is returned with an empty depth; images that are
-/// missing, truncated, of the wrong size, without a time or out of order are skipped and counted. Of images
-/// out of order the fewest are skipped that leave the others in order.
+/// Lists are sorted by time; where the clock restarts (the times start anew), a segment begins. Timestamps in
+/// milliseconds, microseconds, nanoseconds or numbers of frames are recognised by the camera's rate and
+/// converted. A colour image without a depth image near in time is returned with an empty depth; images that
+/// are missing, truncated, of the wrong size or without a plausible time are skipped and counted. notes()
+/// tells what was sorted, converted or taken as unknown.
 class ROSLAM_EXPORT TumSource : public FrameSource {
  public:
-  /// Throws InputError if the folder or a list is missing, malformed or names no image, CalibrationError if
-  /// the camera is invalid.
+  /// Throws InputError if the folder or a list is missing, malformed or names no image, or if the clocks of
+  /// the lists restart at different places; CalibrationError if the camera is invalid or has no
+  /// depth_units_per_metre. Where the timestamps contradict the camera's fps by half, camera() has theirs.
   TumSource(const std::filesystem::path& folder, const Camera& camera, const TumOptions& options = {});
 
   std::optional<Frame> next() override;
@@ -49,6 +49,7 @@ class ROSLAM_EXPORT TumSource : public FrameSource {
   std::optional<std::size_t> size() const override { return size_; }
   std::map<std::string, std::size_t> skipped() const override { return skipped_; }
   std::map<std::string, std::size_t> skipped_depth() const override { return skipped_depth_; }
+  std::map<std::string, std::size_t> notes() const override;
 
   /// The file of a frame's colour image. index: of a frame returned by next().
   std::filesystem::path colour_file(std::size_t index) const { return folder_ / colour_[index].file; }
@@ -60,6 +61,10 @@ class ROSLAM_EXPORT TumSource : public FrameSource {
   static bool recognises(const std::filesystem::path& folder);
 
  private:
+  void open_lists();
+  std::vector<TimedFile> ordered(const char* name, const char* kind, TimedFileList list,
+                                 std::map<std::string, std::size_t>& skipped);
+  void pair_with_depth(double max_time_difference);
   std::optional<Frame> read(std::size_t index);
   cv::Mat read_depth_for(std::size_t index, const cv::Size& colour_size);
 
@@ -70,7 +75,10 @@ class ROSLAM_EXPORT TumSource : public FrameSource {
   std::vector<int> depth_of_colour_;
   std::map<std::string, std::size_t> skipped_;
   std::map<std::string, std::size_t> skipped_depth_;
-  std::size_t size_ = 0;  // colour images listed
+  std::map<std::string, std::size_t> notes_;
+  std::size_t size_ = 0;                    // colour images listed
+  int bits_ = 8;                            // of a channel of the colour images so far
+  std::size_t saturated_depth_pixels_ = 0;  // taken as unknown
   std::size_t position_ = 0;
 };
 

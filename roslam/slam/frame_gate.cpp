@@ -39,13 +39,14 @@ std::string_view describe(RejectReason reason) {
 FrameGate::Verdict FrameGate::check(const Frame& frame, const cv::Mat& mask) {
   if (const RejectReason reason = check_images(frame, mask); reason != RejectReason::kNone) return {reason};
   if (!std::isfinite(frame.timestamp)) return {RejectReason::kTimeNotFinite};
-  bool is_clock_reset = false;
-  if (last_timestamp_ && frame.timestamp <= *last_timestamp_) {
+  bool is_clock_reset = last_timestamp_ && frame.segment != segment_;
+  if (!is_clock_reset && last_timestamp_ && frame.timestamp <= *last_timestamp_) {
     is_clock_reset = *last_timestamp_ - frame.timestamp > kStepBack || ++not_increasing_ >= kInARow;
     if (!is_clock_reset) return {RejectReason::kTimeNotIncreasing};
   }
   not_increasing_ = 0;
   last_timestamp_ = frame.timestamp;
+  segment_ = frame.segment;
   return {RejectReason::kNone, is_clock_reset};
 }
 

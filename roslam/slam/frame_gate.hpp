@@ -31,6 +31,7 @@ class FrameGate {
 
   cv::Size size_;
   std::optional<double> last_timestamp_;  // of the last frame that was used
+  int segment_ = 0;                       // of that frame
   int not_increasing_ = 0;                // frames in a row
 };
 

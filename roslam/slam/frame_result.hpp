@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -44,6 +45,7 @@ struct ROSLAM_EXPORT FrameResult {
   int inliers = 0;       ///< landmarks that support the pose
   double quality = 0.0;  ///< tracking quality, 0 (predicted or unknown) to 1
   bool is_keyframe = false;
+  std::vector<std::string> warnings;        ///< what is newly doubtful about the input, with the remedy
   bool is_clock_reset = false;              ///< the source's clock was found to have restarted at this frame
   double tracking_seconds = 0.0;            ///< processor time of the tracking thread
   DynamicObjects dynamic_objects;           ///< what was found to move, or may move

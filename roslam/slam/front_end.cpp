@@ -2,6 +2,7 @@
 #include "roslam/slam/front_end.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -15,6 +16,7 @@ FrontEnd::FrontEnd(const Camera& camera, const Options& options, Mode mode,
     : camera_(camera),
       options_(options),
       mode_(mode),
+      depth_check_(camera.fx),
       segmentation_(options.dynamic_objects.labels ? std::move(segmenter) : nullptr, mode, options.threads),
       detector_(camera, detector_settings(options)),
       extractor_(options.orb) {}
@@ -30,19 +32,48 @@ FrontEndResult FrontEnd::observe(const Frame& frame, const cv::Mat& mask,
   FrontEndResult result;
   cv::Mat grey;
   cv::cvtColor(frame.colour, grey, cv::COLOR_BGR2GRAY);
+  brightness_.update(grey);
+  grey = brightness_.apply(grey);
+  check_input(frame, grey, result);
   if (detects()) result.dynamic_objects = detect(frame, grey, predicted_T_camera_world, frame_count);
   result.detection_seconds = watch.seconds();
   extract(frame, grey, mask, frame_count, result);
   const cv::Mat& hidden = result.dynamic_objects.mask;
   if (!hidden.empty()) result.hidden_share = cv::countNonZero(hidden) / static_cast<double>(hidden.total());
+  result.may_start = !fills_image(frame, result);
   result.extraction_seconds = watch.seconds() - result.detection_seconds;
   return result;
+}
+
+// Whether movable objects fill the image, also where the labels of all of it were not used.
+bool FrontEnd::fills_image(const Frame& frame, const FrontEndResult& observation) const {
+  if (observation.hidden_share >= options_.tracker.hidden_share &&
+      observation.removed_points.size() > observation.points.size())
+    return true;
+  const bool awaits_labels = mode_ == Mode::kRealTime && segmentation_.is_on() &&
+                             observation.dynamic_objects.label_age < 0 && faults().empty();
+  if (awaits_labels) return true;
+  if (!observation.dynamic_objects.is_everything_labelled || frame.depth.empty()) return false;
+  // What fills nine tenths of the image is near, if it is a person or a car; else the labels are wrong.
+  constexpr double kNear = 3.0;  // metres
+  const cv::Mat near = (frame.depth > 0.0F) & (frame.depth < kNear);
+  return 2 * cv::countNonZero(near) > cv::countNonZero(frame.depth > 0.0F);
+}
+
+void FrontEnd::check_input(const Frame& frame, const cv::Mat& grey, FrontEndResult& observation) {
+  depth_check_.add(grey, frame.depth, frame.timestamp);
+  const auto all = warnings();
+  if (all.size() == warned_.size()) return;
+  for (const auto& [warning, frames] : all) {
+    if (warned_.insert(warning).second) observation.warnings.push_back(warning);
+  }
 }
 
 DynamicObjects FrontEnd::detect(const Frame& frame, const cv::Mat& grey,
                                 const std::optional<SE3>& predicted_T_camera_world, std::size_t frame_count) {
   const auto every = static_cast<std::size_t>(options_.dynamic_objects.label_every);
-  if (mode_ == Mode::kRealTime || frame_count % every == 0) segmentation_.offer(frame.index, frame.colour);
+  if (mode_ == Mode::kRealTime || frame_count % every == 0)
+    segmentation_.offer(frame.index, brightness_.apply(frame.colour));
   const auto labels = segmentation_.take();
   DynamicObjects objects = detector_.detect(frame, grey, predicted_T_camera_world, labels);
   // Labels that the detector rejected are not for the dense map either.
@@ -85,8 +116,10 @@ bool FrontEnd::follow_corrections(const Map& map, const std::optional<SE3>& trac
   return true;
 }
 
-void FrontEnd::remember(const TrackedFrame& frame, const Map& map, const FrontEndResult& observation) {
+void FrontEnd::remember(const TrackedFrame& frame, const Map& map, const FrontEndResult& observation,
+                        bool is_keyframe) {
   last_inliers_ = frame.inliers;
+  depth_check_.note_tracking(frame.T_camera_world.has_value(), is_keyframe);
   const bool is_measured = frame.state == TrackingState::kTracking;
   // Only a measured pose is one that the map can be asked for again after it was corrected.
   if (is_measured) measured_T_camera_world_ = frame.T_camera_world;
@@ -104,6 +137,7 @@ void FrontEnd::remember(const TrackedFrame& frame, const Map& map, const FrontEn
 
 void FrontEnd::reset() {
   detector_.reset();
+  depth_check_.restart_clock();
   labels_.release();
 }
 
@@ -118,6 +152,23 @@ std::map<std::string, std::size_t> FrontEnd::faults() const {
   for (const auto& [reason, count] : detector_.faults()) faults[reason] += count;
   if (detector_.flickers() > 0) faults["labels come and go"] += detector_.flickers();
   return faults;
+}
+
+std::map<std::string, std::size_t> FrontEnd::warnings() const {
+  constexpr std::size_t kSeveral = 10;  // frames
+  std::map<std::string, std::size_t> warnings;
+  if (brightness_.dark() >= kSeveral)
+    warnings["the images are dark; expose longer or add light"] = brightness_.dark();
+  if (brightness_.flat() >= kSeveral)
+    warnings["the images have little contrast; check the lens and the exposure"] = brightness_.flat();
+  for (const std::string& alarm : depth_check_.alarms()) warnings[alarm] = 1;
+  constexpr double kOffCentre =
+      0.15;  // of the image's size; more is a crop, or the calibration of another size
+  if (std::abs(camera_.cx / camera_.width - 0.5) > kOffCentre ||
+      std::abs(camera_.cy / camera_.height - 0.5) > kOffCentre)
+    warnings["the principal point is far from the image centre; is the calibration of another image size?"] =
+        1;
+  return warnings;
 }
 
 }  // namespace roslam

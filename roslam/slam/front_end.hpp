@@ -6,13 +6,16 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "roslam/dynamic_objects/dynamic_object_detector.hpp"
+#include "roslam/features/brightness.hpp"
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/map/map.hpp"
+#include "roslam/sensors/depth_check.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/slam/options.hpp"
 #include "roslam/slam/segmentation_worker.hpp"
@@ -26,7 +29,9 @@ struct FrontEndResult {
   std::shared_ptr<const ObservedFrame> view;
   std::vector<cv::Point2f> points;          ///< corners that were used, pixels of the image as taken
   std::vector<cv::Point2f> removed_points;  ///< corners on dynamic objects
+  std::vector<std::string> warnings;        ///< as FrameResult::warnings
   double hidden_share = 0.0;                ///< of the image, covered by dynamic objects
+  bool may_start = true;                    ///< as FrameHint::may_start
   double detection_seconds = 0.0;           ///< processor time
   double extraction_seconds = 0.0;          ///< processor time
 };
@@ -54,7 +59,11 @@ class FrontEnd {
   bool follow_corrections(const Map& map, const std::optional<SE3>& tracked_T_camera_world);
 
   /// Tells what tracking made of the frame that observe() was called for. The caller holds the map's mutex.
-  void remember(const TrackedFrame& frame, const Map& map, const FrontEndResult& observation);
+  void remember(const TrackedFrame& frame, const Map& map, const FrontEndResult& observation,
+                bool is_keyframe);
+
+  /// Ends a wait for labels; there are none any more. May be called from any thread.
+  void cancel() { segmentation_.cancel(); }
 
   /// Forgets earlier frames, as after a reset of the source's clock.
   void reset();
@@ -65,17 +74,25 @@ class FrontEnd {
 
   std::vector<float> level_scales() const;
   std::map<std::string, std::size_t> faults() const;
+
+  /// What is doubtful about the input so far, in words, and in how many frames.
+  std::map<std::string, std::size_t> warnings() const;
   StageTimes times() const { return segmentation_.times(); }
 
  private:
   DynamicObjects detect(const Frame& frame, const cv::Mat& grey,
                         const std::optional<SE3>& predicted_T_camera_world, std::size_t frame_count);
+  bool fills_image(const Frame& frame, const FrontEndResult& observation) const;
+  void check_input(const Frame& frame, const cv::Mat& grey, FrontEndResult& observation);
   void extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& mask, std::size_t frame_count,
                FrontEndResult& observation);
 
   Camera camera_;
   Options options_;
   Mode mode_;
+  BrightnessNormaliser brightness_;
+  DepthCheck depth_check_;
+  std::set<std::string> warned_;  // warnings that were handed out
   SegmentationWorker segmentation_;
   DynamicObjectDetector detector_;
   OrbExtractor extractor_;

@@ -66,6 +66,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("tracker", "scarce_inliers", o.tracker.scarce_inliers);
   visit("tracker", "hidden_share", o.tracker.hidden_share);
   visit("tracker", "max_predicted", o.tracker.max_predicted);
+  visit("tracker", "max_wait_to_start", o.tracker.max_wait_to_start);
   visit("tracker", "recently_lost_frames", o.tracker.recently_lost_frames);
   visit("tracker", "new_submap_after_lost", o.tracker.new_submap_after_lost);
   visit("keyframes", "enabled", o.keyframes.enabled);

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <exception>
 
-#include "roslam/slam/paced_reader.hpp"
+#include "roslam/sensors/paced_reader.hpp"
 
 namespace roslam {
 

@@ -103,30 +103,29 @@ void SegmentationWorker::note_delay() {
 void SegmentationWorker::offer(std::size_t index, const cv::Mat& colour) {
   if (state_ == nullptr) return;
   std::unique_lock lock(state_->mutex);
+  if (state_->should_stop) return;
   if (mode_ == Mode::kRealTime) {
     note_delay();
     state_->waiting = Request{index, colour};
     state_->changed.notify_all();
     return;
   }
-  // Given up for good: whether it comes back in time must not decide what the result is.
-  if (state_->is_late) return;
   state_->waiting = Request{index, colour};
   state_->answer.reset();
   state_->changed.notify_all();
-  const bool answered =
-      state_->changed.wait_for(lock, std::chrono::duration<double>(threads_.segmentation_timeout),
-                               [&] { return !state_->waiting && !state_->is_busy; });
-  if (!answered) {
-    state_->is_late = true;
-    ++state_->faults[kNoAnswer];
-  }
+  state_->changed.wait(lock, [&] { return state_->should_stop || (!state_->waiting && !state_->is_busy); });
+}
+
+void SegmentationWorker::cancel() {
+  if (state_ == nullptr) return;
+  const std::scoped_lock lock(state_->mutex);
+  state_->should_stop = true;
+  state_->changed.notify_all();
 }
 
 std::optional<LabelledFrame> SegmentationWorker::take() {
   if (state_ == nullptr) return std::nullopt;
   const std::scoped_lock lock(state_->mutex);
-  if (mode_ == Mode::kDeterministic && state_->is_late) return std::nullopt;
   return std::exchange(state_->answer, std::nullopt);
 }
 

@@ -16,10 +16,11 @@
 namespace roslam {
 
 /// Runs a segmenter on a thread of its own, so that what goes wrong in it costs labels and nothing else: what
-/// it throws is counted, and one that does not answer is given up and left behind.
+/// it throws is counted, and in real-time mode one that does not answer is given up and left behind. In
+/// deterministic mode an answer is waited for however long it takes, as a clock must not decide the result.
 class SegmentationWorker {
  public:
-  /// threads: how long an answer may take. Null segmenter: there never are labels.
+  /// threads: how long an answer may take in real-time mode. Null segmenter: there never are labels.
   SegmentationWorker(std::shared_ptr<Segmenter> segmenter, Mode mode, const ThreadOptions& threads);
 
   /// Asks the segmenter to stop and leaves it behind if it does not.
@@ -29,10 +30,13 @@ class SegmentationWorker {
 
   bool is_on() const { return state_ != nullptr; }
 
-  /// Offers a frame for labelling. In deterministic mode it is labelled at once. In real-time mode this never
-  /// waits: the frame takes the place of the one that waits, if one does. colour must not be changed
-  /// afterwards.
+  /// Offers a frame for labelling. In deterministic mode it is labelled at once; cancel() ends the wait. In
+  /// real-time mode this never waits: the frame takes the place of the one that waits, if one does. colour
+  /// must not be changed afterwards.
   void offer(std::size_t index, const cv::Mat& colour);
+
+  /// Ends labelling; a wait for an answer ends at once. May be called from any thread.
+  void cancel();
 
   /// The newest labels that were not taken yet. Never waits.
   std::optional<LabelledFrame> take();

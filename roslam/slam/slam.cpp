@@ -77,12 +77,18 @@ std::map<SubmapId, std::size_t> Slam::frames_in_other_submaps() const {
   return frames;
 }
 
+std::set<SubmapId> Slam::submaps_on_objects() const {
+  const std::scoped_lock lock(impl_->map_mutex);
+  return impl_->log.submaps_on_objects(impl_->map);
+}
+
 const Map& Slam::map() const { return impl_->map; }
 
 SavedMap Slam::snapshot() const {
   const std::scoped_lock lock(impl_->map_mutex);
   return SavedMap::of(impl_->camera, impl_->map,
-                      impl_->keyframe_database ? &*impl_->keyframe_database : nullptr);
+                      impl_->keyframe_database ? &*impl_->keyframe_database : nullptr,
+                      impl_->log.submaps_on_objects(impl_->map));
 }
 
 std::optional<DenseMap> Slam::dense_map(const std::stop_token& stop) const {
@@ -111,6 +117,8 @@ std::map<std::string, std::size_t> Slam::restoration_faults() const {
 }
 
 std::map<std::string, std::size_t> Slam::labelling_faults() const { return impl_->front_end.faults(); }
+
+std::map<std::string, std::size_t> Slam::warnings() const { return impl_->front_end.warnings(); }
 
 const Camera& Slam::camera() const { return impl_->camera; }
 const Options& Slam::options() const { return impl_->options; }

@@ -6,6 +6,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <set>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -89,6 +90,9 @@ class ROSLAM_EXPORT Slam {
   /// Frames tracked in each submap other than the main one.
   std::map<SubmapId, std::size_t> frames_in_other_submaps() const;
 
+  /// Submaps, other than the main one, that were mapped on dynamic objects; snapshot() leaves them out.
+  std::set<SubmapId> submaps_on_objects() const;
+
   const Map& map() const;
 
   /// A copy of the map, for save_map().
@@ -110,6 +114,11 @@ class ROSLAM_EXPORT Slam {
 
   /// What failed in labelling so far, by message.
   std::map<std::string, std::size_t> labelling_faults() const;
+
+  /// What is doubtful about the input so far, in words with the remedy, and in how many frames: dark images,
+  /// depth that does not belong to the colour images or is of an implausible scale, a calibration of another
+  /// size.
+  std::map<std::string, std::size_t> warnings() const;
 
   const Camera& camera() const;
   const Options& options() const;

@@ -73,9 +73,10 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   if (verdict.is_clock_reset) restart_clock(frame.timestamp);
   FrontEndResult observation = front_end.observe(frame, mask, predict_pose(frame.timestamp), log.frames());
   result.dynamic_objects = std::move(observation.dynamic_objects);
+  result.warnings = std::move(observation.warnings);
 
   std::unique_lock map_lock(map_mutex);
-  FrameHint hint{result.dynamic_objects.T_camera_world, observation.hidden_share,
+  FrameHint hint{result.dynamic_objects.T_camera_world, observation.hidden_share, observation.may_start,
                  [&] { return similar_keyframes(*observation.view); }};
   // A pose in the map as it was before a correction is no hint any more.
   if (front_end.follow_corrections(map, tracker.last_pose())) hint.T_camera_world.reset();
@@ -83,7 +84,9 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   tracked.hidden = count_hidden_landmarks(map, tracked, camera, result.dynamic_objects.mask);
   const KeyframeId keyframe = create_keyframe(tracked, frame.index);
   log.add(tracked, frame.index, map);
-  front_end.remember(tracked, map, observation);
+  log.add_evidence(tracked, map,
+                   landmarks_on_objects(map, tracked, camera, result.dynamic_objects.mask, frame.depth));
+  front_end.remember(tracked, map, observation, keyframe.is_valid());
   if (tracked.reference.is_valid()) result.submap = map.submap_of(tracked.reference);
   cull_contradicted(tracked, frame, result.dynamic_objects);
   map_lock.unlock();
@@ -234,6 +237,7 @@ void Slam::Impl::finish() {
 }
 
 void Slam::Impl::cancel() {
+  front_end.cancel();
   mapping.cancel();
   closing.cancel();
   if (restoration) restoration->cancel();

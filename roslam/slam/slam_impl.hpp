@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "roslam/loop_closing/loop_closer.hpp"
+#include "roslam/map/keyframe_pose_table.hpp"
 #include "roslam/map/map.hpp"
 #include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/local_mapper.hpp"
@@ -14,7 +15,6 @@
 #include "roslam/slam/frame_gate.hpp"
 #include "roslam/slam/front_end.hpp"
 #include "roslam/slam/keyframe_worker.hpp"
-#include "roslam/map/keyframe_pose_table.hpp"
 #include "roslam/slam/restoration_worker.hpp"
 #include "roslam/slam/slam.hpp"
 #include "roslam/slam/trajectory_log.hpp"

@@ -27,6 +27,25 @@ void TrajectoryLog::add(const TrackedFrame& frame, std::size_t index, const Map&
   records_.push_back(record);
 }
 
+void TrajectoryLog::add_evidence(const TrackedFrame& frame, const Map& map,
+                                 const LandmarksInView& landmarks) {
+  if (!frame.reference.is_valid() || frame.state != TrackingState::kTracking) return;
+  Evidence& evidence = evidence_[map.submap_of(frame.reference)];
+  ++evidence.frames;
+  if (landmarks.all > 0) evidence.share += static_cast<double>(landmarks.on_objects) / landmarks.all;
+}
+
+std::set<SubmapId> TrajectoryLog::submaps_on_objects(const Map& map) const {
+  constexpr int kFewest = 5;  // frames
+  constexpr double kMost = 0.5;
+  std::set<SubmapId> found;
+  for (const auto& [submap, evidence] : evidence_) {
+    if (evidence.frames >= kFewest && evidence.share > kMost * evidence.frames) found.insert(submap);
+  }
+  found.erase(main_submap(map));
+  return found;
+}
+
 Trajectory TrajectoryLog::trajectory(const Map& map, SubmapId submap) const {
   Trajectory result;
   for (const auto& record : records_) {

@@ -10,6 +10,7 @@
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/map/map.hpp"
 #include "roslam/slam/frame_result.hpp"
+#include "roslam/tracking/keyframe_policy.hpp"
 #include "roslam/tracking/tracker.hpp"
 
 namespace roslam {
@@ -21,6 +22,12 @@ class TrajectoryLog {
  public:
   /// index: of the frame in its source.
   void add(const TrackedFrame& frame, std::size_t index, const Map& map);
+  /// landmarks: of the frame's submap that were seen, and those of them that are on dynamic objects.
+  void add_evidence(const TrackedFrame& frame, const Map& map, const LandmarksInView& landmarks);
+
+  /// Submaps, other than the main one, whose landmarks turned out to be on dynamic objects in most cases.
+  std::set<SubmapId> submaps_on_objects(const Map& map) const;
+
   void add_rejected(RejectReason reason) { ++rejected_[reason]; }
   void add_clock_reset() { ++clock_resets_; }
 
@@ -54,6 +61,12 @@ class TrajectoryLog {
     SE3 T_camera_reference;
   };
 
+  struct Evidence {
+    int frames = 0;
+    double share = 0.0;  // of landmarks on dynamic objects, sum over the frames
+  };
+
+  std::map<SubmapId, Evidence> evidence_;
   std::vector<Record> records_;
   std::map<TrackingState, std::size_t> by_state_;
   std::map<RejectReason, std::size_t> rejected_;

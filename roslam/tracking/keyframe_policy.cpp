@@ -57,22 +57,44 @@ bool KeyframePolicy::needs_keyframe(const TrackedFrame& frame, const Map& map, b
   return (due || mapper_idle || weak) && (little_overlap || needs_near);
 }
 
-int count_hidden_landmarks(const Map& map, const TrackedFrame& frame, const Camera& camera,
-                           const cv::Mat& mask) {
+namespace {
+// Calls visit(pixel, depth) for the landmarks of the frame's reference that project into the image.
+template <typename Visit>
+void for_each_in_view(const Map& map, const TrackedFrame& frame, const Camera& camera, const cv::Size& image,
+                      const Visit& visit) {
   const Keyframe* reference = map.find(frame.reference);
-  if (mask.empty() || reference == nullptr || !frame.T_camera_world) return 0;
-  int hidden = 0;
+  if (reference == nullptr || !frame.T_camera_world) return;
   for (const LandmarkId id : reference->landmarks) {
     const Landmark* landmark = map.find(id);
     if (landmark == nullptr) continue;
     const Eigen::Vector3d point = *frame.T_camera_world * landmark->position;
     if (point.z() <= 0.0) continue;
     const Eigen::Vector2d pixel = camera.distort(camera.project(point));
-    const int x = static_cast<int>(std::lround(pixel.x()));
-    const int y = static_cast<int>(std::lround(pixel.y()));
-    if (x >= 0 && y >= 0 && x < mask.cols && y < mask.rows && mask.at<std::uint8_t>(y, x) != 0) ++hidden;
+    const cv::Point at(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y())));
+    if (at.x >= 0 && at.y >= 0 && at.x < image.width && at.y < image.height) visit(at, point.z());
   }
+}
+}  // namespace
+
+int count_hidden_landmarks(const Map& map, const TrackedFrame& frame, const Camera& camera,
+                           const cv::Mat& mask) {
+  int hidden = 0;
+  for_each_in_view(map, frame, camera, mask.size(),
+                   [&](const cv::Point& at, double) { hidden += mask.at<std::uint8_t>(at) != 0 ? 1 : 0; });
   return hidden;
+}
+
+LandmarksInView landmarks_on_objects(const Map& map, const TrackedFrame& frame, const Camera& camera,
+                                     const cv::Mat& mask, const cv::Mat& depth) {
+  constexpr double kSameDepth = 0.1;  // of the depth
+  LandmarksInView landmarks;
+  if (depth.size() != mask.size()) return landmarks;
+  for_each_in_view(map, frame, camera, mask.size(), [&](const cv::Point& at, double z) {
+    ++landmarks.all;
+    const bool is_there = std::abs(depth.at<float>(at) - z) < kSameDepth * z;
+    landmarks.on_objects += is_there && mask.at<std::uint8_t>(at) != 0 ? 1 : 0;
+  });
+  return landmarks;
 }
 
 }  // namespace roslam

@@ -34,4 +34,15 @@ class KeyframePolicy {
 int count_hidden_landmarks(const Map& map, const TrackedFrame& frame, const Camera& camera,
                            const cv::Mat& mask);
 
+/// Landmarks of the frame's reference keyframe in view of the frame.
+struct LandmarksInView {
+  int all = 0;
+  int on_objects = 0;  ///< in the mask, at the depth measured there
+};
+
+/// Which landmarks turn out to be on dynamic objects rather than behind them. mask: as above; depth:
+/// CV_32FC1, metres. Nothing where the frame has no pose or nothing is masked.
+LandmarksInView landmarks_on_objects(const Map& map, const TrackedFrame& frame, const Camera& camera,
+                                     const cv::Mat& mask, const cv::Mat& depth);
+
 }  // namespace roslam

@@ -52,6 +52,8 @@ void TrackerOptions::validate() const {
     throw OptionsError("tracker.hidden_share must be 0 to 1");
   if (!(max_predicted >= 0.0 && max_predicted <= 60.0))
     throw OptionsError("tracker.max_predicted must be 0 to 60 seconds");
+  if (!(max_wait_to_start >= 0.0 && max_wait_to_start <= 60.0))
+    throw OptionsError("tracker.max_wait_to_start must be 0 to 60 seconds");
   if (new_submap_after_lost < 0) throw OptionsError("tracker.new_submap_after_lost must not be negative");
   if (recently_lost_frames < 0) throw OptionsError("tracker.recently_lost_frames must not be negative");
 }
@@ -83,7 +85,7 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   frame.landmarks.resize(view->size());
   frame.view = std::move(view);
   if (map_.keyframe_count() == 0) {
-    return can_start(frame) ? initialise(std::move(frame)) : frame;
+    return can_start(frame, hint) ? initialise(std::move(frame)) : frame;
   }
 
   const bool was_known = state_ == TrackingState::kTracking || state_ == TrackingState::kPredicted;
@@ -96,7 +98,7 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     remember(frame);
   } else if (was_known && predict_hidden(frame, hint)) {
     state_ = TrackingState::kPredicted;
-  } else if (const bool could_start = can_start(frame);
+  } else if (const bool could_start = can_start(frame, hint);
              could_start && ++frames_unrecognised_ == settings_.tracker.new_submap_after_lost) {
     return initialise(std::move(frame));
   } else {
@@ -112,10 +114,18 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   return frame;
 }
 
-bool Tracker::can_start(const TrackedFrame& frame) const {
-  const auto& depths = frame.view->depths;
-  const auto known = std::count_if(depths.begin(), depths.end(), [](float d) { return d > 0.0F; });
-  return known >= settings_.tracker.min_initial_points;
+bool Tracker::can_start(const TrackedFrame& frame, const FrameHint& hint) {
+  const ObservedFrame& view = *frame.view;
+  int known = 0;
+  for (std::size_t i = 0; i < view.size(); ++i) known += view.depths[i] > 0.0F && !view.may_move(i) ? 1 : 0;
+  if (known < settings_.tracker.min_initial_points) return false;
+  if (hint.may_start) {
+    waits_since_.reset();
+    return true;
+  }
+  // The wait is bounded, as labels may be wrong, or what is movable may rest before the camera for good.
+  if (!waits_since_) waits_since_ = frame.timestamp;
+  return frame.timestamp - *waits_since_ >= settings_.tracker.max_wait_to_start;
 }
 
 // The first frame of a submap.
@@ -381,6 +391,7 @@ void Tracker::keyframe_created(KeyframeId id) {
 
 void Tracker::restart_clock(double timestamp) {
   velocity_.reset();
+  waits_since_.reset();
   last_.timestamp = timestamp;
 }
 

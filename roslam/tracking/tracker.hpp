@@ -25,6 +25,7 @@ namespace roslam {
 struct FrameHint {
   std::optional<SE3> T_camera_world;  ///< a better initial pose than predicted_pose(), if any
   double hidden_share = 0.0;          ///< of the image, hidden by dynamic objects
+  bool may_start = true;  ///< false where movable objects fill the image, on which no map must start
 
   /// Keyframes similar to the frame, best first; called only to relocalise. May be empty.
   std::function<std::vector<KeyframeId>()> similar_keyframes = {};
@@ -91,7 +92,7 @@ class Tracker {
   const Times& times() const { return times_; }
 
  private:
-  bool can_start(const TrackedFrame& frame) const;
+  bool can_start(const TrackedFrame& frame, const FrameHint& hint);
   TrackedFrame initialise(TrackedFrame frame);
   bool follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_world);
   bool match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor);
@@ -122,6 +123,7 @@ class Tracker {
   // Points of the current frame matched with points of the last frame that have no landmark.
   std::vector<std::uint32_t> unmapped_points_;
   std::vector<Eigen::Vector3d> unmapped_positions_;  // world, metres
+  std::optional<double> waits_since_;  // seconds; to start a map, for a view that movable objects do not fill
   int frames_lost_ = 0;
   int frames_unrecognised_ = 0;  // of these, frames with enough points to start a submap
   Times times_;

@@ -12,7 +12,10 @@ struct ROSLAM_EXPORT TrackerOptions {
   double min_agreement = 0.5;      ///< share of all matches that must agree on the first estimate
   int trusted_inliers = 60;        ///< inliers from which on the tracking quality is 1
   int scarce_inliers = 50;         ///< below that many matches, points without a landmark are used as well
-  double hidden_share = 0.5;       ///< of the image; from which a pose is predicted if tracking fails
+  double hidden_share = 0.5;       ///< of the image; from which a pose is predicted if tracking fails, and no
+                                   ///< map is started
+  double max_wait_to_start = 3.0;  ///< seconds for which movable objects that fill the image keep a map from
+                                   ///< being started
   double max_predicted = 1.5;      ///< seconds since the last tracked frame for which they are
   int recently_lost_frames = 30;   ///< frames after which recently lost becomes lost
   int new_submap_after_lost = 30;  ///< lost frames that could start a map before a new submap is; 0: never

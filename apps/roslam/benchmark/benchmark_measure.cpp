@@ -76,6 +76,10 @@ void throw_if_any_failed(const BenchmarkedSequence& sequence) {
   }
 }
 
+recording::OutputFolder benchmark_folder(const BenchmarkArguments& arguments) {
+  return {arguments.out, "benchmark", {"benchmark.md", "benchmark.json", "runs"}, arguments.overwrite};
+}
+
 void add_benchmark_options(CLI::App& command, BenchmarkArguments& arguments) {
   command
       .add_option("--sequences", arguments.sequences,
@@ -102,6 +106,8 @@ void add_benchmark_options(CLI::App& command, BenchmarkArguments& arguments) {
   command.add_option("--frames", arguments.settings.frames, "Number of frames of simulated flights; 0 = all")
       ->capture_default_str();
   command.add_option("--seed", arguments.settings.seed, "Seed of simulated flights")->capture_default_str();
+  command.add_flag("--overwrite", arguments.overwrite,
+                   "Replace files in the folder of --out that no benchmark wrote");
   command.add_flag("--quiet", arguments.quiet, "Print no progress");
   command.add_flag("--json", arguments.json, "Print the report as one JSON object on stdout");
 }

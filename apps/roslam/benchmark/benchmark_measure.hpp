@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/roslam/benchmark/benchmark_run.hpp"
+#include "recording/output_folder.hpp"
 
 namespace roslam::app {
 
@@ -19,11 +20,17 @@ struct BenchmarkArguments {
   int runs = 3;  ///< of each sequence
   bool json = false;
   bool quiet = false;
+  bool overwrite = false;  ///< replace files in the folder that no benchmark wrote
   BenchmarkSettings settings;
 };
 
-/// --sequences, --camera, --out, --runs, --real-time, --config, --frames, --seed, --traffic, --quiet, --json.
+/// --sequences, --camera, --out, --runs, --real-time, --config, --frames, --seed, --traffic, --overwrite,
+/// --quiet,
+/// --json.
 void add_benchmark_options(CLI::App& command, BenchmarkArguments& arguments);
+
+/// The folder of --out, for this benchmark alone while it runs. Throws as OutputFolder does.
+recording::OutputFolder benchmark_folder(const BenchmarkArguments& arguments);
 
 /// Header of a benchmark's report.
 struct BenchmarkHeader {

@@ -67,7 +67,7 @@ void write_report(const BenchmarkReport& report, const fs::path& out) {
 void execute(const BenchmarkArguments& arguments, const std::string& version) {
   const InterruptWatcher interrupt;
   const fs::path out = arguments.out;
-  make_folder(out);
+  const auto folder = benchmark_folder(arguments);
   BenchmarkReport report{header_of(arguments, version), {}};
   // A wrong options file would fail every run.
   if (!arguments.settings.config.empty()) read_options(arguments.settings.config);

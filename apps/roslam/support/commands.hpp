@@ -2,9 +2,16 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <stdexcept>
 #include <string>
 
 namespace roslam::app {
+
+/// Results are written, but are not all that --strict asks for: exit code 3.
+class IncompleteRun : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 // Each adds one subcommand. Its callback does the work and throws roslam::Error on bad input.
 void add_run_command(CLI::App& program, const std::string& version);

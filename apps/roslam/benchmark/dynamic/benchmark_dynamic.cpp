@@ -162,7 +162,7 @@ void execute(DynamicArguments arguments, const std::string& version) {
   const InterruptWatcher interrupt;
   BenchmarkArguments& common = arguments.common;
   const fs::path out = common.out;
-  make_folder(out);
+  const auto folder = benchmark_folder(common);
   if (std::set<std::string>(arguments.modes.begin(), arguments.modes.end()).size() != arguments.modes.size())
     throw CLI::ValidationError("--modes", "names a mode twice");
   // Errors that would fail every run are found before the first.

@@ -27,7 +27,7 @@ Exit code: 0 success, 1 an error in the input or a sequence that failed, 2 wrong
 
 void execute(const MapBenchmarkSettings& settings, const std::string& version) {
   const InterruptWatcher interrupt;
-  make_folder(settings.common.out);
+  const auto folder = benchmark_folder(settings.common);
   const auto sequences = sequences_of(settings);
   if (!settings.truth.empty() && sequences.front().is_simulated())
     throw CLI::ValidationError("--truth", "is rendered for a simulated flight; leave it out");

@@ -26,7 +26,7 @@ Exit code: 0 success, 1 an error in the input or a sequence that failed, 2 wrong
 
 void execute(const RestorationBenchmarkSettings& settings, const std::string& version) {
   const InterruptWatcher interrupt;
-  make_folder(settings.common.out);
+  const auto folder = benchmark_folder(settings.common);
   const auto sequences = sequences_of(settings);
   run_truth_benchmark(
       settings.common, sequences, interrupt,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/slam/paced_reader.hpp"
+#include "roslam/sensors/paced_reader.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -48,7 +48,7 @@ void PacedReader::read(const std::stop_token& stop) {
 
 // A gap of hours in a recording must not make the program seem to hang.
 Clock::duration PacedReader::pause(double from, double to) {
-  constexpr double kLongest = 1.0;  // seconds
+  constexpr double kLongest = 1.0;                         // seconds
   if (!std::isfinite(to)) return Clock::duration::zero();  // the pipeline rejects such a frame
   return std::chrono::duration_cast<Clock::duration>(
       std::chrono::duration<double>(std::clamp(to - from, 0.0, kLongest)));

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace roslam::recording {
+
+/// Exclusive use of an existing folder among processes of this program, until it is destroyed or the process
+/// ends, however it ends.
+class FolderLock {
+ public:
+  /// Throws OutputError if another process holds it. On file systems without locks it holds nothing.
+  explicit FolderLock(const std::filesystem::path& folder);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int descriptor_ = -1;
+};
+
+/// The folder that a command writes to. Files that the same command wrote before may be replaced; those of
+/// anybody else are not touched, unless the user asked for it.
+class OutputFolder {
+ public:
+  /// Creates and locks the folder and marks it as the command's. names: files and folders that will be
+  /// written; files of an earlier call are removed, as they must not pass for results of this one. Throws
+  /// OutputError if another process writes to the folder or if a name exists that the command did not write
+  /// and overwrite is false.
+  OutputFolder(const std::filesystem::path& path, const std::string& command,
+               const std::vector<std::string>& names, bool overwrite);
+
+  const std::filesystem::path& path() const { return path_; }
+
+  /// Throws OutputError unless a file may be written: it does not exist, or is the command's own, or
+  /// overwrite.
+  void require_free(const std::filesystem::path& name) const;
+
+ private:
+  std::filesystem::path path_;
+  std::string command_;
+  FolderLock lock_;
+  bool may_replace_;
+};
+
+}  // namespace roslam::recording

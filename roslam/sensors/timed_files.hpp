@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "roslam/common/export.hpp"
+
+namespace roslam {
+
+/// One line of a list of images, such as rgb.txt.
+struct ROSLAM_EXPORT TimedFile {
+  double timestamp = 0.0;      ///< seconds; before with_seconds() as written
+  std::filesystem::path file;  ///< relative to the folder of the list
+  int segment = 0;             ///< restarts of the clock before it
+};
+
+/// The lines of a list of images.
+struct TimedFileList {
+  std::vector<TimedFile> entries;
+  std::size_t without_time = 0;  ///< lines whose time is not finite, which are left out
+};
+
+/// Reads lines "timestamp file"; # begins a comment. A file name may be quoted and may hold blanks, escaped
+/// by a backslash or not, and backslashes in place of slashes; the spelling that exists is taken. Throws
+/// InputError if the list is missing, malformed or names no image.
+TimedFileList read_timed_files(const std::filesystem::path& list);
+
+/// A unit of timestamps.
+struct TimeUnit {
+  double seconds = 1.0;
+  std::string_view name = "seconds";
+};
+
+/// The unit of the timestamps of a camera: of seconds, milliseconds, microseconds, nanoseconds and numbers of
+/// frames the one whose median interval is nearest to the camera's. Seconds for fewer than five entries.
+TimeUnit time_unit_of(const std::vector<TimedFile>& entries, double fps);
+
+/// Median interval between timestamps in ascending order, in their unit; 0 for fewer than two times.
+double median_interval(const std::vector<TimedFile>& entries);
+
+/// A list in the order of time.
+struct OrderedFiles {
+  std::vector<TimedFile> entries;  ///< timestamps strictly increase within each segment
+  std::size_t repeated = 0;        ///< left out, as their time is that of another
+  std::size_t implausible = 0;     ///< left out, as their time fits neither their place nor another
+  bool was_sorted = true;          ///< before
+  int restarts = 0;                ///< of the clock
+};
+
+/// Sorts a list. Where the clock restarted, which shows in times that go on increasing from an earlier one, a
+/// segment begins. A line that is out of order is left out where its time does not fit between others, as
+/// that of a corrupt timestamp.
+OrderedFiles in_order_of_time(std::vector<TimedFile> entries);
+
+}  // namespace roslam
