@@ -231,6 +231,15 @@ TEST_F(ComposeCommand, TellsWhenTheDiskIsFull) {
   fails(compose_base("--out out"), "10.000000.png: cannot be written in full");
 }
 
+TEST_F(ComposeCommand, WithoutActorsNeedsNoPeople) {
+  const Outcome outcome = compose("base --camera camera.yaml --actors 0 --out out");
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  EXPECT_EQ(listed("out/rgb.txt").size(), static_cast<std::size_t>(kFrames));
+  const Outcome without = compose("base --camera camera.yaml --out out");
+  EXPECT_EQ(without.code, 2);
+  EXPECT_NE(without.error.find("--people"), std::string::npos) << without.error;
+}
+
 TEST_F(ComposeCommand, WrongUsageIsTwo) {
   EXPECT_EQ(compose_base("").code, 2);
   EXPECT_EQ(compose_base("--out out --actors -1").code, 2);
