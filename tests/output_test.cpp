@@ -25,6 +25,34 @@ class Output : public Dataset {
     return run_program("run '" + data_.string() + "' --quiet --camera simulated --out '" + out + "'",
                        scratch_);
   }
+
+  // Runs after some shell commands; all files that it leaves are those of a run that nothing hinders.
+  void expect_whole_files(const std::string& before, const Outcome& outcome) const {
+    expect_refused(outcome, {run_.string(), "cannot be written in full"});
+    std::size_t files = 0;
+    for (const auto& entry : fs::recursive_directory_iterator(run_)) {
+      if (!entry.is_regular_file()) continue;
+      ++files;
+      const fs::path whole = whole_ / fs::relative(entry.path(), run_);
+      ASSERT_TRUE(fs::exists(whole)) << before << ": " << entry.path();
+      const std::string bytes = content(entry.path());
+      if (entry.path().filename() == "run.json") {
+        EXPECT_FALSE(nlohmann::json::parse(bytes, nullptr, false).is_discarded());
+      } else if (entry.path().filename() == "report.html") {
+        EXPECT_NE(bytes.find("</html>"), std::string::npos);
+      } else {
+        EXPECT_TRUE(bytes == content(whole)) << before << ": " << entry.path();
+      }
+    }
+    EXPECT_GT(files, 0U) << before;
+  }
+
+  void make_whole_run() const {
+    const Outcome outcome = run_to(whole_.string());
+    ASSERT_EQ(outcome.code, 0) << outcome.error;
+  }
+
+  const fs::path whole_ = scratch_ / "whole";
 };
 
 TEST_F(Output, FolderThatCannotBeMadeIsNamed) {
@@ -72,6 +100,28 @@ TEST_F(Output, DiskThatFillsUpIsReported) {
   EXPECT_EQ(umount(run_.c_str()), 0);
   expect_refused(outcome, {run_.string(), "free space"});
   EXPECT_EQ(std::count(trajectory.begin(), trajectory.end(), '\n'), static_cast<long>(kFrames) + 1);
+}
+
+TEST_F(Output, FilesOnAFullDiskAreWholeOrAbsent) {
+  ASSERT_NO_FATAL_FAILURE(make_whole_run());
+  fs::create_directories(run_);
+  for (const char* size : {"size=16k", "size=400k"}) {
+    if (mount("tmpfs", run_.c_str(), "tmpfs", 0, size) != 0) GTEST_SKIP() << "mounting is not allowed here";
+    const Outcome outcome = run();
+    expect_whole_files(size, outcome);
+    EXPECT_EQ(umount(run_.c_str()), 0);
+  }
+}
+
+TEST_F(Output, FilesBeyondTheLimitOfTheirSizeAreAbsentAndTheOthersWhole) {
+  ASSERT_NO_FATAL_FAILURE(make_whole_run());
+  for (const char* blocks : {"4", "400"}) {
+    fs::remove_all(run_);
+    const Outcome outcome = shell_in(
+        scratch_, std::string("ulimit -f ") + blocks + "; '" ROSLAM_PROGRAM "' run '" + data_.string() +
+                      "' --quiet --video --camera simulated --out '" + run_.string() + "'");
+    expect_whole_files(blocks, outcome);
+  }
 }
 
 TEST_F(Output, StandardOutputThatIsFullIsReported) {
