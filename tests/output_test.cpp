@@ -9,6 +9,8 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <thread>
+#include <utility>
 
 #include "tests/street.hpp"
 
@@ -122,6 +124,29 @@ TEST_F(Output, FilesBeyondTheLimitOfTheirSizeAreAbsentAndTheOthersWhole) {
                       "' --quiet --video --camera simulated --out '" + run_.string() + "'");
     expect_whole_files(blocks, outcome);
   }
+}
+
+TEST_F(Output, AReaderThatLeavesCostsNoResults) {
+  for (const std::string reader : {"| true", "| head -n 1", "2>&1 | true"}) {
+    fs::remove_all(run_);
+    shell_in(scratch_, "('" ROSLAM_PROGRAM "' run '" + data_.string() +
+                           "' --dynamic none --camera simulated --out '" + run_.string() + "'" +
+                           (reader == "| true" ? " --json" : "") + "; echo $? >code) " + reader);
+    EXPECT_EQ(content(scratch_ / "code"), "0\n") << reader;
+    for (const char* file : kResults) EXPECT_TRUE(fs::exists(run_ / file)) << reader << file;
+    EXPECT_EQ(report()["interrupted"], false);
+  }
+}
+
+TEST_F(Output, AHangUpThatIsIgnoredStaysIgnored) {
+  const Outcome outcome = shell_in(
+      scratch_, "{ trap '' HUP; '" ROSLAM_PROGRAM "' run '" + data_.string() +
+                    "' --quiet --camera simulated --out '" + run_.string() +
+                    "' & process=$!; for i in 1 2 3 4 5 6 7 8; do kill -HUP $process; sleep 0.1; done; "
+                    "wait $process; }");
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  EXPECT_EQ(report()["interrupted"], false);
+  EXPECT_EQ(report()["frames"]["processed"], kFrames);
 }
 
 TEST_F(Output, StandardOutputThatIsFullIsReported) {
@@ -241,6 +266,18 @@ TEST_P(Interrupt, ASecondOneStillWritesTrajectoryAndMap) {
   ASSERT_NO_FATAL_FAILURE(expect_success());
   EXPECT_FALSE(trajectory().empty());
   EXPECT_TRUE(fs::exists(run_ / "map.roslam"));
+}
+
+// The kernel and the shell may each send the signal of a terminal that is closed, and neither asks to hurry.
+TEST_P(Interrupt, AClosedTerminalEndsTheFlightOnceAndWritesEverything) {
+  close(std::exchange(terminal_, -1));  // what is written to it fails from now on
+  for (int i = 0; i < 5; ++i) {
+    kill(process_, SIGHUP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  ASSERT_NO_FATAL_FAILURE(expect_success());
+  for (const std::string file : kResults)
+    EXPECT_TRUE(fs::exists(run_ / file) || file == "dense.bt") << file;  // without a keyframe it is absent
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, Interrupt, testing::Values("--deterministic", "--real-time"),
