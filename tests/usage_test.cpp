@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Output that nobody reads.
+// Help, and output that nobody reads.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cctype>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "tests/program.hpp"
 #include "tests/scratch.hpp"
@@ -21,8 +25,79 @@ class Usage : public testing::Test {
     return shell_in(folder_, before + " '" ROSLAM_PROGRAM "' " + arguments);
   }
 
+  static std::vector<std::string> lines_of(const std::string& text) {
+    std::istringstream in(text);
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(in, line);) lines.push_back(line);
+    return lines;
+  }
+
+  // All commands, with the commands below them.
+  std::vector<std::string> commands(const std::string& above = "") const {
+    std::vector<std::string> all{above};
+    bool are_listed = false;
+    for (const auto& line : lines_of(roslam(above + " --help", "COLUMNS=120").out)) {
+      if (line == "Subcommands:") are_listed = true;
+      if (line.empty()) are_listed = false;
+      if (!are_listed || line.size() < 3 || line[1] != ' ' || line[2] == ' ') continue;
+      const auto below = commands(above + " " + line.substr(2, line.find(' ', 2) - 2));
+      all.insert(all.end(), below.begin(), below.end());
+    }
+    return all;
+  }
+
+  // Without the spaces and backslashes at which lines are broken.
+  static std::string letters(std::string text) {
+    std::erase_if(text, [](unsigned char c) { return std::isspace(c) || c == '\\'; });
+    return text;
+  }
+
   const fs::path folder_ = scratch_path();
 };
+
+TEST_F(Usage, HelpFitsTheTerminal) {
+  const auto all = commands();
+  ASSERT_GE(all.size(), 20U);
+  for (const auto& command : all) {
+    std::string before;
+    for (const std::size_t width : {60U, 80U}) {
+      const Outcome help = roslam(command + " --help", "COLUMNS=" + std::to_string(width));
+      EXPECT_EQ(help.code, 0);
+      for (const auto& line : lines_of(help.out)) EXPECT_LE(line.size(), width) << command << ": " << line;
+      EXPECT_TRUE(before.empty() || letters(help.out) == before) << command;
+      before = letters(help.out);
+    }
+  }
+}
+
+TEST_F(Usage, HelpHasEightyColumnsWhereTheWidthIsUnknown) {
+  const auto widest = [&](const std::string& columns) {
+    std::size_t most = 0;
+    for (const auto& line : lines_of(roslam("run --help", columns).out)) most = std::max(most, line.size());
+    return most;
+  };
+  for (const char* unknown : {"COLUMNS=", "COLUMNS=0", "COLUMNS=-3", "COLUMNS=many", "env -u COLUMNS"})
+    EXPECT_EQ(widest(unknown), 80U) << unknown;
+  EXPECT_LE(widest("COLUMNS=7"), 40U);
+  EXPECT_GT(widest("COLUMNS=1000"), 100U);
+  EXPECT_LE(widest("COLUMNS=1000"), 120U);
+}
+
+TEST_F(Usage, HelpKeepsColumnsListsAndExamples) {
+  const std::string help = roslam("run --help", "COLUMNS=80").out;
+  for (const char* lines :
+       {"  roslam run simulated:street --out street\n",
+        "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n",
+        "  trajectory.txt keyframes.txt camera poses of frames and keyframes (TUM format)\n",
+        "  dense.ply dense.bt           dense map: points and triangles; free and\n"
+        "                               occupied space (OctoMap)\n",
+        "  --print-config              Print the effective options (YAML) and exit\n"})
+    EXPECT_NE(help.find(lines), std::string::npos) << lines << help;
+  const std::string narrow = roslam("run --help", "COLUMNS=60").out;
+  EXPECT_NE(narrow.find("  roslam run my_flight --camera my_camera.yaml --real-time \\\n      --out live\n"),
+            std::string::npos)
+      << narrow;
+}
 
 TEST_F(Usage, AReaderThatLeavesIsNoFailure) {
   // The exit code of the program, which writes more than a pipe holds or after its reader has left.

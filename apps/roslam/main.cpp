@@ -10,6 +10,7 @@
 #include <string>
 
 #include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/help_formatter.hpp"
 #include "apps/roslam/support/output.hpp"
 #include "roslam/common/out_of_memory.hpp"
 #include "roslam/version.hpp"
@@ -70,7 +71,8 @@ int main(int argc, char** argv) {
   cv::setNumThreads(1);
   // OpenCV prints what it then throws, which is reported once, below.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-  CLI::App program("RO-SLAM: RGB-D SLAM for drones in dynamic environments.");
+  CLI::App program("RO-SLAM: RGB-D SLAM for drones in dynamic environments.", "roslam");
+  program.formatter(std::make_shared<roslam::app::HelpFormatter>(roslam::app::terminal_width()));
   program.require_subcommand(1);
   program.set_version_flag("--version", roslam::kVersion);
   add_commands(program);
