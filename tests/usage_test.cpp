@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Help, and output that nobody reads.
+// Help, wrong usage, and output that nobody reads.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cctype>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/program.hpp"
@@ -50,6 +51,14 @@ class Usage : public testing::Test {
   static std::string letters(std::string text) {
     std::erase_if(text, [](unsigned char c) { return std::isspace(c) || c == '\\'; });
     return text;
+  }
+
+  void expect_one_line(const std::string& arguments, const std::string& words) const {
+    const Outcome outcome = roslam(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_EQ(outcome.out, "") << arguments;
+    EXPECT_NE(outcome.error.find(words), std::string::npos) << outcome.error;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
   }
 
   const fs::path folder_ = scratch_path();
@@ -97,6 +106,32 @@ TEST_F(Usage, HelpKeepsColumnsListsAndExamples) {
   EXPECT_NE(narrow.find("  roslam run my_flight --camera my_camera.yaml --real-time \\\n      --out live\n"),
             std::string::npos)
       << narrow;
+}
+
+TEST_F(Usage, UnknownCommandsAndOptionsAreNamedWithSimilarOnes) {
+  for (const auto& [arguments, words] : std::vector<std::pair<std::string, std::string>>{
+           {"rnu", "unknown command 'rnu'; did you mean 'run'?"},
+           {"bench static", "unknown command 'bench'; did you mean 'benchmark'?"},
+           {"merge a b --out c", "unknown command 'merge'; did you mean 'map merge'?"},
+           {"frobnicate", "unknown command 'frobnicate'; see roslam --help"},
+           {"map inof x", "unknown command 'inof'; did you mean 'info'?"},
+           {"map frobnicate", "unknown command 'frobnicate'; see roslam map --help"},
+           {"benchmark dynamik", "did you mean 'dynamic'?"},
+           {"evaluate trajectroy", "did you mean 'trajectory'?"},
+           {"vocabulary tarin", "did you mean 'train'?"},
+           {"run simulated:street --realtime --out x",
+            "unknown option '--realtime'; did you mean '--real-time'?"},
+           {"run simulated:street --output=x", "unknown option '--output'; did you mean '--out'?"},
+           {"run simulated:street -out x", "did you mean '--out'?"},
+           {"--verison", "unknown option '--verison'; did you mean '--version'?"},
+           {"render m.ply --out x.png --color rgb", "did you mean '--colour'?"},
+           {"compose base --camrea tum-fr1 --people p --out x", "did you mean '--camera'?"},
+           {"map export x --frobnicate", "unknown option '--frobnicate'; see roslam map export --help"},
+           {"run simulated:street street2 --out x", "unexpected argument 'street2'; see roslam run --help"},
+           {"map", "see roslam map --help"},
+           {"run", "SOURCE is required; see roslam run --help"},
+           {"run simulated:street --out x --seed many", "see roslam run --help"}})
+    expect_one_line(arguments, words);
 }
 
 TEST_F(Usage, AReaderThatLeavesIsNoFailure) {

@@ -12,6 +12,7 @@
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/help_formatter.hpp"
 #include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/usage_error.hpp"
 #include "roslam/common/out_of_memory.hpp"
 #include "roslam/version.hpp"
 
@@ -54,7 +55,7 @@ int execute(CLI::App& program, int argc, char** argv) {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) {
-      program.exit(error);
+      std::cerr << "error: " << one_line(roslam::app::explain(program, error)) << "\n";
       return kUsageError;
     }
     program.exit(error);  // prints --help or --version
