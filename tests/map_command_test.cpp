@@ -134,6 +134,27 @@ TEST_F(MapCommand, ARunFolderStandsForItsMap) {
   expect_refused(run("--dynamic none --map " + quoted(localised)), {"holds no map.roslam"});
 }
 
+TEST_F(MapCommand, AMapIsNotMergedWithItselfOrItsContinuation) {
+  const fs::path first = fly("first", 0, 40) / "map.roslam";
+  const fs::path copy = kept_ / "copy.roslam";
+  fs::copy_file(first, copy);
+  const auto merge = [&](const fs::path& a, const fs::path& b) {
+    return map("merge '" + a.string() + "' '" + b.string() + "' --quiet --out '" + (kept_ / "both").string() +
+               "'");
+  };
+  for (const auto& other : {first, copy})
+    expect_refused(merge(first, other), {other.string(), "contains all of its keyframes"});
+  EXPECT_FALSE(fs::exists(kept_ / "both"));
+  const fs::path further = fly("further", 30, 60, "--map '" + first.string() + "'") / "map.roslam";
+  const Outcome merged = merge(further, first);
+  if (merged.code != 0) {
+    expect_refused(merged, {"contains all of its keyframes"});
+  } else {  // keyframes of the first that the continuation culled
+    EXPECT_LE(info(kept_ / "both")["keyframes"].get<int>(),
+              info(further)["keyframes"].get<int>() + info(first)["keyframes"].get<int>() / 2);
+  }
+}
+
 TEST_F(MapCommand, WhatDoesNotFitTogetherIsRefused) {
   const fs::path street = fly("street", 0, 30) / "map.roslam";
   const fs::path mirrored = fly("mirrored", 0, 30, "", true) / "map.roslam";

@@ -181,7 +181,8 @@ void add_merge_command(CLI::App& map) {
       "Example:\n"
       "  roslam map merge monday/map.roslam tuesday/map.roslam --out street.roslam\n"
       "Place recognition aligns each map with the merged ones; coordinates are those of the first. A map\n"
-      "in which no keyframe of the others is recognised is refused.\n"
+      "in which no keyframe of the others is recognised is refused, as is one that the others contain, such\n"
+      "as a map and its continuation by --map. Keyframes that both hold are inserted once.\n"
       "Exit code: 0 success, 1 an error in the input, 2 wrong usage.");
   command
       ->add_option("MAPS", arguments->maps,
