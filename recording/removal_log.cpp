@@ -2,6 +2,8 @@
 #include "recording/removal_log.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstring>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
@@ -21,6 +23,17 @@ constexpr std::size_t kStripImages = 8;
 constexpr const char* kFullDisk = ": cannot be written in full; check the free space on the disk";
 constexpr const char* kStrip = "removal.jpg";
 constexpr const char* kVideo = "removal.avi";
+
+// OpenCV does not report a full disk, but writes the length of the file into its header in the end.
+bool is_whole_video(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::array<char, 8> header{};  // "RIFF" and the number of bytes that follow
+  in.read(header.data(), header.size());
+  std::uint32_t rest = 0;
+  std::memcpy(&rest, header.data() + 4, sizeof rest);
+  std::error_code error;
+  return in && fs::file_size(file, error) == rest + header.size();
+}
 }  // namespace
 
 void RemovalLog::remove_old(const fs::path& folder) {
@@ -147,11 +160,14 @@ void RemovalLog::finish() {
   if (thread_.joinable()) thread_.join();
   tally_.lines_dropped = lines_dropped_;
   lines_.close();
+  const bool has_video = video_.isOpened();
   video_.release();
   if (!failure_ && !lines_) {
     failure_ =
         std::make_exception_ptr(OutputError((settings_.folder / kDescriptorFile).string() + kFullDisk));
   }
+  if (!failure_ && has_video && !is_whole_video(settings_.folder / kVideo))
+    failure_ = std::make_exception_ptr(OutputError((settings_.folder / kVideo).string() + kFullDisk));
   if (failure_) {
     // On a full disk the trajectory needs the space more.
     remove_old(settings_.folder);

@@ -231,6 +231,30 @@ TEST_F(ComposeCommand, TellsWhenTheDiskIsFull) {
   fails(compose_base("--out out"), "10.000000.png: cannot be written in full");
 }
 
+TEST_F(ComposeCommand, ListsOfACompositionThatFailsAreAbsent) {
+  ASSERT_EQ(compose_base("--out out").code, 0);
+  const Outcome outcome = shell_in(folder_, std::string("ulimit -f 2; ") + ROSLAM_PROGRAM +
+                                                " compose base --camera camera.yaml --actors 0 --out out");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_NE(outcome.error.find("ulimit"), std::string::npos) << outcome.error;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "out")) {
+    EXPECT_NE(entry.path().extension(), ".part");
+    const bool is_image = entry.path().extension() == ".png";
+    EXPECT_TRUE(!is_image || !image(fs::relative(entry.path(), folder_).string()).empty()) << entry.path();
+  }
+  for (const char* list : {"rgb.txt", "depth.txt", "background.txt", "background_depth.txt"})
+    EXPECT_FALSE(fs::exists(folder_ / "out" / list)) << list;
+}
+
+TEST_F(ComposeCommand, WithoutActorsNeedsNoPeople) {
+  const Outcome outcome = compose("base --camera camera.yaml --actors 0 --out out");
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  EXPECT_EQ(listed("out/rgb.txt").size(), static_cast<std::size_t>(kFrames));
+  const Outcome without = compose("base --camera camera.yaml --out out");
+  EXPECT_EQ(without.code, 2);
+  EXPECT_NE(without.error.find("--people"), std::string::npos) << without.error;
+}
+
 TEST_F(ComposeCommand, WrongUsageIsTwo) {
   EXPECT_EQ(compose_base("").code, 2);
   EXPECT_EQ(compose_base("--out out --actors -1").code, 2);

@@ -228,7 +228,7 @@ TEST_F(Export, RefusesWhatDoesNotFit) {
   expect_refused("run/map.roslam --pcd x.pcd", 2, {"--pcd", "dense map"});
   expect_refused("run --keyframes x.txt --mesh x.ply", 2, {"--mesh"});
   // Of a run folder, what holds poses.
-  expect_refused("run --keyframes x.txt", 1, {"run/map.roslam"});
+  expect_refused("run --keyframes x.txt", 1, {"run: the folder holds no map.roslam"});
   fs::remove(folder / "run/dense.ply");
   expect_refused("run --ply x.ply", 1, {"run/dense.ply", "no such file", "map.roslam"});
   expect_refused("none.ply --ply x.ply", 1, {"none.ply"});

@@ -117,6 +117,44 @@ TEST_F(MapCommand, MapsThatOverlapAreMergedAndExported) {
   EXPECT_EQ(exported_camera, *camera_preset("simulated"));
 }
 
+TEST_F(MapCommand, ARunFolderStandsForItsMap) {
+  const fs::path first = fly("first", 0, 30);
+  EXPECT_EQ(info(first), info(first / "map.roslam"));
+  const auto quoted = [](const fs::path& path) { return std::string(1, '\'') + path.string() + "' "; };
+  const std::string out = quoted(kept_ / "out");
+  ASSERT_EQ(map("export " + quoted(first) + "--keyframes " + out).code, 0);
+  EXPECT_EQ(content(kept_ / "out"), content(first / "keyframes.txt"));
+  const fs::path localised = fly("localised", 10, 30, "--localise-only --map " + quoted(first));
+  fly("further", 20, 50, "--map " + quoted(first));
+  for (const std::string& arguments :
+       {"info " + quoted(localised), "export --keyframes " + out + quoted(localised),
+        "merge --quiet --out " + out + quoted(first) + quoted(localised)})
+    expect_refused(map(arguments),
+                   {localised.string() + ": the folder holds no map.roslam", "--localise-only"});
+  expect_refused(run("--dynamic none --map " + quoted(localised)), {"holds no map.roslam"});
+}
+
+TEST_F(MapCommand, AMapIsNotMergedWithItselfOrItsContinuation) {
+  const fs::path first = fly("first", 0, 40) / "map.roslam";
+  const fs::path copy = kept_ / "copy.roslam";
+  fs::copy_file(first, copy);
+  const auto merge = [&](const fs::path& a, const fs::path& b) {
+    return map("merge '" + a.string() + "' '" + b.string() + "' --quiet --out '" + (kept_ / "both").string() +
+               "'");
+  };
+  for (const auto& other : {first, copy})
+    expect_refused(merge(first, other), {other.string(), "contains all of its keyframes"});
+  EXPECT_FALSE(fs::exists(kept_ / "both"));
+  const fs::path further = fly("further", 30, 60, "--map '" + first.string() + "'") / "map.roslam";
+  const Outcome merged = merge(further, first);
+  if (merged.code != 0) {
+    expect_refused(merged, {"contains all of its keyframes"});
+  } else {  // keyframes of the first that the continuation culled
+    EXPECT_LE(info(kept_ / "both")["keyframes"].get<int>(),
+              info(further)["keyframes"].get<int>() + info(first)["keyframes"].get<int>() / 2);
+  }
+}
+
 TEST_F(MapCommand, WhatDoesNotFitTogetherIsRefused) {
   const fs::path street = fly("street", 0, 30) / "map.roslam";
   const fs::path mirrored = fly("mirrored", 0, 30, "", true) / "map.roslam";

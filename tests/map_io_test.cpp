@@ -234,6 +234,53 @@ TEST_F(Atlas, MapsThatOverlapBecomeOne) {
   EXPECT_EQ(encode_map(load_map(file_)), encode_map(merged));
 }
 
+TEST_F(Atlas, MapsThatContainOneAnotherAreNotMerged) {
+  SavedMap whole = fly(0.0, 1.5);
+  whole.name = "whole";
+  SavedMap part = SavedMap::of(whole.camera, whole.map, nullptr);
+  part.name = "part";
+  const auto merge = [&](const SavedMap& first, const SavedMap& second) {
+    return error_of([&] { merge_maps(first, second, vocabulary_, loop_settings(Options{})); });
+  };
+  EXPECT_EQ(merge(whole, part).find("part: whole contains all of its keyframes"), 0U);
+  part.map.remove_keyframe(KeyframeId{0}, KeyframeId{1});
+  part = SavedMap::of(whole.camera, part.map, nullptr);
+  part.name = "part";
+  EXPECT_EQ(merge(whole, part).find("part: whole contains all of its keyframes"), 0U);
+  EXPECT_EQ(merge(part, whole).find("part: whole contains all of its keyframes"), 0U);
+}
+
+TEST_F(Atlas, KeyframesOfBothMapsAreInsertedOnce) {
+  const SavedMap whole = fly(0.0, 1.5);
+  const auto without = [&](bool is_left_out(std::size_t, std::size_t)) {
+    SavedMap all = SavedMap::of(whole.camera, whole.map, nullptr);
+    Map& map = all.map;
+    const auto ids = map.keyframe_ids();
+    const KeyframeId anchor = ids[ids.size() / 2];
+    for (const KeyframeId id : ids) {
+      if (is_left_out(id.index(), ids.size())) map.remove_keyframe(id, anchor);
+    }
+    return SavedMap::of(whole.camera, map, nullptr);
+  };
+  const SavedMap first = without([](std::size_t i, std::size_t n) { return i > 2 * n / 3; });
+  const SavedMap second = without([](std::size_t i, std::size_t n) { return i < n / 3; });
+  ASSERT_LT(first.map.keyframe_count(), whole.map.keyframe_count());
+  ASSERT_LT(second.map.keyframe_count(), whole.map.keyframe_count());
+  const SavedMap merged = merge_maps(first, second, vocabulary_, loop_settings(Options{}));
+  EXPECT_EQ(merged.map.keyframe_count(), whole.map.keyframe_count());
+  EXPECT_LE(merged.map.landmark_count(), whole.map.landmark_count() * 11 / 10);
+  EXPECT_EQ(merged.map.submaps().size(), 1U);
+  std::set<double> times;
+  for (const KeyframeId id : merged.map.keyframe_ids()) {
+    const Keyframe& keyframe = *merged.map.find(id);
+    EXPECT_TRUE(times.insert(keyframe.timestamp).second);
+    const SE3 truth = WallFlight::on_ring(0.05 * static_cast<double>(keyframe.frame_index));
+    EXPECT_LT((truth * keyframe.T_camera_world.inverse()).translation().norm(), 0.05) << id.value;
+  }
+  save_map(file_, merged);
+  EXPECT_EQ(encode_map(load_map(file_)), encode_map(merged));
+}
+
 TEST_F(Atlas, MapsThatDoNotOverlapAreNotMerged) {
   const SavedMap first = fly(0.0, 1.0);
   const SavedMap second = fly(3.0, 4.0);

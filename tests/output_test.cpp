@@ -9,6 +9,8 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <thread>
+#include <utility>
 
 #include "tests/street.hpp"
 
@@ -25,6 +27,34 @@ class Output : public Dataset {
     return run_program("run '" + data_.string() + "' --quiet --camera simulated --out '" + out + "'",
                        scratch_);
   }
+
+  // Runs after some shell commands; all files that it leaves are those of a run that nothing hinders.
+  void expect_whole_files(const std::string& before, const Outcome& outcome) const {
+    expect_refused(outcome, {run_.string(), "cannot be written in full"});
+    std::size_t files = 0;
+    for (const auto& entry : fs::recursive_directory_iterator(run_)) {
+      if (!entry.is_regular_file()) continue;
+      ++files;
+      const fs::path whole = whole_ / fs::relative(entry.path(), run_);
+      ASSERT_TRUE(fs::exists(whole)) << before << ": " << entry.path();
+      const std::string bytes = content(entry.path());
+      if (entry.path().filename() == "run.json") {
+        EXPECT_FALSE(nlohmann::json::parse(bytes, nullptr, false).is_discarded());
+      } else if (entry.path().filename() == "report.html") {
+        EXPECT_NE(bytes.find("</html>"), std::string::npos);
+      } else {
+        EXPECT_TRUE(bytes == content(whole)) << before << ": " << entry.path();
+      }
+    }
+    EXPECT_GT(files, 0U) << before;
+  }
+
+  void make_whole_run() const {
+    const Outcome outcome = run_to(whole_.string());
+    ASSERT_EQ(outcome.code, 0) << outcome.error;
+  }
+
+  const fs::path whole_ = scratch_ / "whole";
 };
 
 TEST_F(Output, FolderThatCannotBeMadeIsNamed) {
@@ -72,6 +102,51 @@ TEST_F(Output, DiskThatFillsUpIsReported) {
   EXPECT_EQ(umount(run_.c_str()), 0);
   expect_refused(outcome, {run_.string(), "free space"});
   EXPECT_EQ(std::count(trajectory.begin(), trajectory.end(), '\n'), static_cast<long>(kFrames) + 1);
+}
+
+TEST_F(Output, FilesOnAFullDiskAreWholeOrAbsent) {
+  ASSERT_NO_FATAL_FAILURE(make_whole_run());
+  fs::create_directories(run_);
+  for (const char* size : {"size=16k", "size=400k"}) {
+    if (mount("tmpfs", run_.c_str(), "tmpfs", 0, size) != 0) GTEST_SKIP() << "mounting is not allowed here";
+    const Outcome outcome = run();
+    expect_whole_files(size, outcome);
+    EXPECT_EQ(umount(run_.c_str()), 0);
+  }
+}
+
+TEST_F(Output, FilesBeyondTheLimitOfTheirSizeAreAbsentAndTheOthersWhole) {
+  ASSERT_NO_FATAL_FAILURE(make_whole_run());
+  for (const char* blocks : {"4", "400"}) {
+    fs::remove_all(run_);
+    const Outcome outcome = shell_in(
+        scratch_, std::string("ulimit -f ") + blocks + "; '" ROSLAM_PROGRAM "' run '" + data_.string() +
+                      "' --quiet --video --camera simulated --out '" + run_.string() + "'");
+    expect_whole_files(blocks, outcome);
+  }
+}
+
+TEST_F(Output, AReaderThatLeavesCostsNoResults) {
+  for (const std::string reader : {"| true", "| head -n 1", "2>&1 | true"}) {
+    fs::remove_all(run_);
+    shell_in(scratch_, "('" ROSLAM_PROGRAM "' run '" + data_.string() +
+                           "' --dynamic none --camera simulated --out '" + run_.string() + "'" +
+                           (reader == "| true" ? " --json" : "") + "; echo $? >code) " + reader);
+    EXPECT_EQ(content(scratch_ / "code"), "0\n") << reader;
+    for (const char* file : kResults) EXPECT_TRUE(fs::exists(run_ / file)) << reader << file;
+    EXPECT_EQ(report()["interrupted"], false);
+  }
+}
+
+TEST_F(Output, AHangUpThatIsIgnoredStaysIgnored) {
+  const Outcome outcome = shell_in(
+      scratch_, "{ trap '' HUP; '" ROSLAM_PROGRAM "' run '" + data_.string() +
+                    "' --quiet --camera simulated --out '" + run_.string() +
+                    "' & process=$!; for i in 1 2 3 4 5 6 7 8; do kill -HUP $process; sleep 0.1; done; "
+                    "wait $process; }");
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  EXPECT_EQ(report()["interrupted"], false);
+  EXPECT_EQ(report()["frames"]["processed"], kFrames);
 }
 
 TEST_F(Output, StandardOutputThatIsFullIsReported) {
@@ -191,6 +266,18 @@ TEST_P(Interrupt, ASecondOneStillWritesTrajectoryAndMap) {
   ASSERT_NO_FATAL_FAILURE(expect_success());
   EXPECT_FALSE(trajectory().empty());
   EXPECT_TRUE(fs::exists(run_ / "map.roslam"));
+}
+
+// The kernel and the shell may each send the signal of a terminal that is closed, and neither asks to hurry.
+TEST_P(Interrupt, AClosedTerminalEndsTheFlightOnceAndWritesEverything) {
+  close(std::exchange(terminal_, -1));  // what is written to it fails from now on
+  for (int i = 0; i < 5; ++i) {
+    kill(process_, SIGHUP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  ASSERT_NO_FATAL_FAILURE(expect_success());
+  for (const std::string file : kResults)
+    EXPECT_TRUE(fs::exists(run_ / file) || file == "dense.bt") << file;  // without a keyframe it is absent
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, Interrupt, testing::Values("--deterministic", "--real-time"),

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "roslam/common/error.hpp"
+#include "tests/file_size_limit.hpp"
 #include "tests/scratch.hpp"
 
 namespace roslam::recording {
@@ -318,6 +319,23 @@ TEST_F(RemovedObjects, ADiskThatFailsIsReportedAtTheEndAndNeverWaitedFor) {
     for (std::size_t i = 0; i < 10 * kImages; ++i) log.add(frame(i), with_person(i));
     EXPECT_THROW(log.finish(), OutputError);
     EXPECT_TRUE(fs::is_empty(folder_));  // the disk space is for the other results
+  }
+}
+
+TEST_F(RemovedObjects, AVideoThatIsCutIsReportedAndRemoved) {
+  constexpr std::size_t kFrames = 90;
+  std::uintmax_t size = 0;
+  const auto record = [&] {
+    RemovalLog log({folder_, Mode::kDeterministic, 30.0, true});
+    for (std::size_t i = 0; i < kFrames; ++i) log.add(frame(i), without_objects(i));
+    log.finish();
+    size = fs::file_size(folder_ / "removal.avi");
+  };
+  ASSERT_NO_THROW(record());
+  for (const std::uintmax_t limit : {size - 1, size / 2, std::uintmax_t{100000}}) {
+    const FileSizeLimit limited(limit);
+    EXPECT_THROW(record(), OutputError) << limit;
+    EXPECT_TRUE(fs::is_empty(folder_));
   }
 }
 

@@ -76,6 +76,15 @@ TEST_F(Render, LeavesOutWhatWasInvented) {
   EXPECT_EQ(count(image("old.png"), is_magenta), 0);  // by the flag's old name
 }
 
+TEST_F(Render, TakesTheFolderOfARun) {
+  ASSERT_EQ(render(". --view front --out a.png").code, 0);
+  ASSERT_EQ(render("dense.ply --view front --trajectory . --out b.png").code, 0);
+  EXPECT_EQ(content(folder / "a.png"), content(folder / "b.png"));
+  make_folder(folder / "empty");
+  EXPECT_NE(render("empty --out x.png").error.find("empty: the folder holds no dense.ply"),
+            std::string::npos);
+}
+
 TEST_F(Render, SaysWhatIsWrong) {
   EXPECT_EQ(render("none.ply --out x.png").code, 1);
   EXPECT_NE(render("none.ply --out x.png").error.find("none.ply"), std::string::npos);

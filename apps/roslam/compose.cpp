@@ -135,6 +135,7 @@ void compose(ComposeArguments arguments) {
   arguments.options.max_distance = arguments.distance[1];
   const Eigen::Vector3d up(arguments.up[0], arguments.up[1], arguments.up[2]);
   if (!up.isZero(0.0)) arguments.options.up = up;
+  if (arguments.people.empty() && arguments.options.actors > 0) throw CLI::RequiredError("--people");
   arguments.options.validate();
   const Camera base = load_camera(arguments.camera);
   TumSource source(arguments.settings.folder, base);
@@ -206,8 +207,8 @@ void add_compose_command(CLI::App& program) {
           "--camera", arguments->camera,
           "Its camera: a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file")
       ->required();
-  command->add_option("--people", arguments->people, "Folder of images of people, each with its mask")
-      ->required();
+  command->add_option("--people", arguments->people,
+                      "Folder of images of people, each with its mask; not needed for --actors 0");
   command
       ->add_option("--out", arguments->settings.out,
                    "Folder the sequence is written to; made if it does not exist")

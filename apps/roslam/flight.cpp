@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "apps/roslam/support/named_path.hpp"
 #include "apps/roslam/support/output.hpp"
 #include "apps/roslam/support/progress.hpp"
 #include "apps/roslam/support/restored_folder.hpp"
@@ -81,7 +82,7 @@ SlamSetup setup_of(const FlightArguments& arguments, const std::shared_ptr<Resto
   setup.segmentation_model = arguments.model;
   setup.restoration_models = arguments.models;
   setup.vocabulary = arguments.vocabulary;
-  setup.map = arguments.map;
+  if (!arguments.map.empty()) setup.map = map_file(arguments.map);
   setup.restore_keyframes = arguments.restore;
   setup.on_restored = [restorations](const RestoredKeyframe& keyframe) {
     restorations->strip.add(keyframe.frame.colour, keyframe.view);

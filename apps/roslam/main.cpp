@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fcntl.h>
+
 #include <algorithm>
+#include <csignal>
 #include <exception>
 #include <iostream>
 #include <opencv2/core/utility.hpp>
@@ -7,6 +10,9 @@
 #include <string>
 
 #include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/help_formatter.hpp"
+#include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/usage_error.hpp"
 #include "roslam/common/out_of_memory.hpp"
 #include "roslam/version.hpp"
 
@@ -21,17 +27,17 @@ std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
 }
-}  // namespace
 
-int main(int argc, char** argv) {
-  // Pipeline stages have threads of their own and measure the processor time of those: OpenCV's thread pool
-  // would compete with them, and its work would be missing from the measured times.
-  cv::setNumThreads(1);
-  // OpenCV prints what it then throws, which is reported once, below.
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-  CLI::App program("RO-SLAM: RGB-D SLAM for drones in dynamic environments.");
-  program.require_subcommand(1);
-  program.set_version_flag("--version", roslam::kVersion);
+// Faults of files and pipes must be errors of the calls that write, not ends of the program.
+void prepare_output() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  // A file that is opened while stdout or stderr is closed would take its place, and what is printed.
+  for (int descriptor = 0; descriptor <= 2; ++descriptor)
+    if (fcntl(descriptor, F_GETFD) < 0) open("/dev/null", O_RDWR);
+}
+
+void add_commands(CLI::App& program) {
   roslam::app::add_run_command(program, roslam::kVersion);
   roslam::app::add_simulate_command(program);
   roslam::app::add_compose_command(program);
@@ -42,11 +48,38 @@ int main(int argc, char** argv) {
   roslam::app::add_map_command(program);
   roslam::app::add_vocabulary_command(program);
   roslam::app::add_benchmark_command(program, roslam::kVersion);
+}
+
+// Parses the arguments, which executes the command. Returns the exit code.
+int execute(CLI::App& program, int argc, char** argv) {
   try {
     program.parse(argc, argv);
-    return 0;
   } catch (const CLI::ParseError& error) {
-    return program.exit(error) == 0 ? 0 : kUsageError;
+    if (error.get_exit_code() != 0) {
+      std::cerr << "error: " << one_line(roslam::app::explain(program, error)) << "\n";
+      return kUsageError;
+    }
+    program.exit(error);  // prints --help or --version
+  }
+  roslam::app::require_written_output();
+  return 0;
+}
+}  // namespace
+
+int main(int argc, char** argv) {
+  prepare_output();
+  // Pipeline stages have threads of their own and measure the processor time of those: OpenCV's thread pool
+  // would compete with them, and its work would be missing from the measured times.
+  cv::setNumThreads(1);
+  // OpenCV prints what it then throws, which is reported once, below.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  CLI::App program("RO-SLAM: RGB-D SLAM for drones in dynamic environments.", "roslam");
+  program.formatter(std::make_shared<roslam::app::HelpFormatter>(roslam::app::terminal_width()));
+  program.require_subcommand(1);
+  program.set_version_flag("--version", roslam::kVersion);
+  add_commands(program);
+  try {
+    return execute(program, argc, argv);
   } catch (const roslam::app::IncompleteRun& error) {
     std::cerr << "error: " << one_line(error.what()) << "\n";
     return kIncomplete;

@@ -11,6 +11,7 @@
 
 #include "apps/roslam/export_dense.hpp"
 #include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/named_path.hpp"
 #include "apps/roslam/support/output.hpp"
 #include "apps/roslam/support/progress.hpp"
 #include "apps/roslam/support/sources.hpp"
@@ -98,7 +99,8 @@ struct InfoArguments {
 };
 
 void show_info(const InfoArguments& arguments) {
-  const Json info = describe(arguments.file, load_map(arguments.file));
+  const fs::path file = map_file(arguments.file);
+  const Json info = describe(file, load_map(file));
   if (arguments.json) {
     std::cout << info.dump(-1, ' ', false, Json::error_handler_t::replace) << "\n";
   } else {
@@ -125,11 +127,12 @@ void add_info_command(CLI::App& map) {
   CLI::App* command = map.add_subcommand("info", "Print the contents of a map");
   command->footer(
       "Example:\n"
-      "  roslam map info live/map.roslam\n"
+      "  roslam map info live\n"
       "Prints the camera, the numbers of keyframes, landmarks, loops, sessions (runs that made the map) and\n"
       "submaps (parts not connected with each other), the extent in metres and the size of the file.\n"
       "Exit code: 0 success, 1 an error in the input, 2 wrong usage.");
-  command->add_option("MAP", arguments->file, "Map file that roslam run wrote (map.roslam)")->required();
+  command->add_option("MAP", arguments->file, "Map file (map.roslam), or folder of the run that wrote it")
+      ->required();
   command->add_flag("--json", arguments->json, "Print one JSON object on stdout");
   command->callback([arguments] { show_info(*arguments); });
 }
@@ -152,7 +155,7 @@ void merge(const MergeArguments& arguments) {
         "--vocabulary");
   }
   std::vector<SavedMap> maps;  // all of them first: an error at the end would waste the merges before it
-  for (const auto& file : arguments.maps) maps.push_back(load_map(file));
+  for (const auto& file : arguments.maps) maps.push_back(load_map(map_file(file)));
   SavedMap merged = std::move(maps.front());
   for (std::size_t i = 1; i < maps.size(); ++i) {
     const SavedMap& next = maps[i];
@@ -178,9 +181,12 @@ void add_merge_command(CLI::App& map) {
       "Example:\n"
       "  roslam map merge monday/map.roslam tuesday/map.roslam --out street.roslam\n"
       "Place recognition aligns each map with the merged ones; coordinates are those of the first. A map\n"
-      "in which no keyframe of the others is recognised is refused.\n"
+      "in which no keyframe of the others is recognised is refused, as is one that the others contain, such\n"
+      "as a map and its continuation by --map. Keyframes that both hold are inserted once.\n"
       "Exit code: 0 success, 1 an error in the input, 2 wrong usage.");
-  command->add_option("MAPS", arguments->maps, "Two or more map files (map.roslam) of the same camera")
+  command
+      ->add_option("MAPS", arguments->maps,
+                   "Two or more maps of the same camera: map files (map.roslam) or folders of runs")
       ->required()
       ->expected(2, 1000);
   command->add_option("--out", arguments->out, "File the merged map is written to")->required();
@@ -223,9 +229,9 @@ void export_sparse(const fs::path& file, const ExportArguments& arguments) {
 }
 
 // The map file to read; of a run folder the one that has what is asked for.
-fs::path map_file(const ExportArguments& arguments) {
+fs::path exported_file(const ExportArguments& arguments) {
   if (!fs::is_directory(arguments.map)) return arguments.map;
-  if (arguments.needs_sparse_map()) return arguments.map / "map.roslam";
+  if (arguments.needs_sparse_map()) return map_file(arguments.map);
   const fs::path dense = arguments.map / "dense.ply";
   if (!fs::exists(dense)) {
     throw InputError(dense.string() +
@@ -241,7 +247,9 @@ void export_map(const ExportArguments& arguments) {
   if (!dense.has_file() && arguments.keyframes.empty() && arguments.camera.empty())
     refuse("needs --ply, --mesh, --pcd, --octomap, --keyframes or --camera");
   if (dense.resolution && dense.octomap.empty()) refuse("--resolution needs --octomap");
-  const fs::path file = map_file(arguments);
+  // Options that contradict each other are refused below, whatever the folder holds.
+  const bool contradicts = arguments.needs_sparse_map() && dense.is_of_dense_only();
+  const fs::path file = contradicts ? arguments.map : exported_file(arguments);
   if (is_dense_map(file)) {
     if (arguments.needs_sparse_map())
       refuse("--keyframes, --session and --camera need a map.roslam, not a PLY file");

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/named_path.hpp"
 #include "apps/roslam/support/output.hpp"
 #include "recording/map_render.hpp"
 #include "roslam/common/error.hpp"
@@ -46,7 +47,8 @@ struct Arguments {
 };
 
 SurfaceMap read_map(const Arguments& arguments) {
-  SurfaceMap surface = read_surface_ply(arguments.map);
+  SurfaceMap surface = read_surface_ply(
+      file_in(arguments.map, {"dense.ply"}, "give a PLY file or the folder of a run with a dense map"));
   if (arguments.no_inpainted) surface = without_inpainted(surface);
   if (surface.points.empty())
     throw InputError(arguments.map + ": there are no points to draw; give another map");
@@ -54,9 +56,12 @@ SurfaceMap read_map(const Arguments& arguments) {
 }
 
 Trajectory read_poses(const Arguments& arguments) {
-  const auto beside = std::filesystem::path(arguments.map).parent_path() / "trajectory.txt";
-  return read_trajectory(arguments.trajectory.empty() ? beside : std::filesystem::path(arguments.trajectory))
-      .trajectory;
+  namespace fs = std::filesystem;
+  const fs::path map = arguments.map;
+  const fs::path folder = fs::is_directory(map) ? map : map.parent_path();
+  const fs::path given =
+      arguments.trajectory.empty() ? folder / "trajectory.txt" : fs::path(arguments.trajectory);
+  return read_trajectory(file_in(given, {"trajectory.txt"}, "name the trajectory file itself")).trajectory;
 }
 
 // Views from poses along the trajectory, in rows of three.
@@ -99,7 +104,8 @@ void add_render_command(CLI::App& program) {
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("render", "Render a dense map to an image");
   command->footer(kExamples);
-  command->add_option("MAP", arguments->map, "Dense map (PLY)")->required();
+  command->add_option("MAP", arguments->map, "Dense map (PLY), or folder of a run: its dense.ply")
+      ->required();
   command->add_option("--out", arguments->out, "Image file to write, PNG or JPEG")->required();
   command->add_option("--view", arguments->view, "Viewpoint: top, front or follow")
       ->check(CLI::IsMember({"top", "front", "follow"}))
@@ -108,7 +114,8 @@ void add_render_command(CLI::App& program) {
       ->check(CLI::IsMember(map_colour_names()))
       ->capture_default_str();
   command->add_option("--trajectory", arguments->trajectory,
-                      "Poses for front and follow (TUM format); default trajectory.txt beside MAP");
+                      "Poses for front and follow (TUM format), or folder of a run; default trajectory.txt "
+                      "beside MAP");
   command->add_option("--size", arguments->size, "Width and height of the image, pixels")
       ->expected(2)
       ->check(CLI::Range(16, 16384))

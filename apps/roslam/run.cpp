@@ -210,8 +210,9 @@ void add_run_command(CLI::App& program, const std::string& version) {
                       "Vocabulary for place recognition (roslam vocabulary train); default the shipped one");
   command->add_flag("--no-loops", arguments->flight.no_loops,
                     "Do no place recognition and close no loops: drift is not corrected");
-  command->add_option("--map", arguments->flight.map,
-                      "Continue from the map of an earlier run with the same camera (its map.roslam)");
+  command->add_option(
+      "--map", arguments->flight.map,
+      "Continue from the map of an earlier run with the same camera (its folder or map.roslam)");
   command->add_flag("--localise-only", arguments->flight.localise_only,
                     "Localise in --map without changing the map");
   add_flight_options(*command, arguments->flight.source);

@@ -22,6 +22,26 @@ std::uint32_t crc(std::string_view bytes) {
 }
 
 std::string megabytes(std::uintmax_t bytes) { return std::to_string(bytes / (1024 * 1024)) + " MB"; }
+
+// left: number of bytes after the header. Returns the checksum that the content must have.
+std::uint32_t check_header(std::string_view bytes, std::size_t left, const BinaryFormat& format,
+                           const std::string& name) {
+  if (bytes.empty()) throw InputError(name + ": empty; give the path of " + std::string(format.what));
+  if (bytes.substr(0, kMagic) != format.magic.substr(0, std::min(bytes.size(), kMagic))) {
+    throw InputError(name + ": not " + std::string(format.what) + " of RO-SLAM; give another file");
+  }
+  BinaryReader header(bytes, name);
+  header.get_bytes(kMagic);
+  if (const auto version = header.get<std::uint32_t>(); version != format.version) {
+    throw InputError(name + ": written in version " + std::to_string(version) + " of the format, this " +
+                     "program reads version " + std::to_string(format.version) +
+                     "; make it again with this program");
+  }
+  const auto size = header.get<std::uint64_t>();
+  const auto expected = header.get<std::uint32_t>();
+  if (size != left) header.fail("it is not as long as it should be");
+  return expected;
+}
 }  // namespace
 
 std::string_view BinaryReader::get_bytes(std::size_t count) {
@@ -56,28 +76,6 @@ void write_binary(const std::filesystem::path& file, const BinaryFormat& format,
   whole.put_bytes(content);
   replace_file(file, whole.bytes());
 }
-
-namespace {
-// left: number of bytes after the header. Returns the checksum that the content must have.
-std::uint32_t check_header(std::string_view bytes, std::size_t left, const BinaryFormat& format,
-                           const std::string& name) {
-  if (bytes.empty()) throw InputError(name + ": empty; give the path of " + std::string(format.what));
-  if (bytes.substr(0, kMagic) != format.magic.substr(0, std::min(bytes.size(), kMagic))) {
-    throw InputError(name + ": not " + std::string(format.what) + " of RO-SLAM; give another file");
-  }
-  BinaryReader header(bytes, name);
-  header.get_bytes(kMagic);
-  if (const auto version = header.get<std::uint32_t>(); version != format.version) {
-    throw InputError(name + ": written in version " + std::to_string(version) + " of the format, this " +
-                     "program reads version " + std::to_string(format.version) +
-                     "; make it again with this program");
-  }
-  const auto size = header.get<std::uint64_t>();
-  const auto expected = header.get<std::uint32_t>();
-  if (size != left) header.fail("it is not as long as it should be");
-  return expected;
-}
-}  // namespace
 
 std::string read_binary(const std::filesystem::path& file, const BinaryFormat& format) {
   std::error_code error;

@@ -1,42 +1,53 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/common/write_file.hpp"
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <string>
 
 namespace roslam {
 
 namespace {
-// Called before renaming, so that a power cut cannot leave the final name on bytes that were never written.
-void flush_to_disk(const std::filesystem::path& file) {
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  const bool is_written = fsync(descriptor) == 0 || errno == EINVAL || errno == EROFS;
-  close(descriptor);
-  if (!is_written)
-    throw OutputError(file.string() + ": cannot be written in full; check the free space on the disk");
+namespace fs = std::filesystem;
+
+// file: to be named in messages.
+void write_bytes(const fs::path& to, std::string_view bytes, bool is_flushed, const fs::path& file) {
+  std::FILE* out = std::fopen(to.c_str(), "wbe");
+  if (out == nullptr) {
+    throw OutputError(file.string() +
+                      ": cannot open for writing; check that its folder exists and is writable");
+  }
+  const bool is_written = std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size() &&
+                          std::fflush(out) == 0 &&
+                          (!is_flushed || fsync(fileno(out)) == 0 || errno == EINVAL || errno == EROFS);
+  const bool is_too_large = !is_written && errno == EFBIG;
+  if (std::fclose(out) == 0 && is_written) return;
+  throw OutputError(file.string() + ": cannot be written in full; check the " +
+                    (is_too_large ? "limit of the file size (ulimit -f)" : "free space on the disk"));
+}
+
+void write(const fs::path& file, std::string_view bytes, bool is_flushed) {
+  std::error_code error;
+  const fs::file_status old = fs::status(file, error);
+  if (fs::exists(old) && !fs::is_regular_file(old)) return write_bytes(file, bytes, false, file);
+  const fs::path target = fs::is_symlink(file, error) ? fs::weakly_canonical(file, error) : file;
+  const fs::path part = fs::path(target) += ".part";
+  try {
+    write_bytes(part, bytes, is_flushed, file);
+    fs::rename(part, target, error);
+    if (error)
+      throw OutputError(file.string() + ": cannot be replaced (" + error.message() +
+                        "); choose another name");
+  } catch (...) {
+    fs::remove(part, error);
+    throw;
+  }
 }
 }  // namespace
 
-void replace_file(const std::filesystem::path& file, std::string_view bytes) {
-  std::filesystem::path part = file;
-  part += ".part";
-  std::error_code error;
-  try {
-    write_file(part, bytes);
-    flush_to_disk(part);
-  } catch (...) {
-    std::filesystem::remove(part, error);
-    throw;
-  }
-  std::filesystem::rename(part, file, error);
-  if (!error) return;
-  const std::string reason = error.message();
-  std::filesystem::remove(part, error);
-  throw OutputError(file.string() + ": cannot be replaced (" + reason + "); choose another name");
-}
+void write_file(const fs::path& file, std::string_view bytes) { write(file, bytes, false); }
+void replace_file(const fs::path& file, std::string_view bytes) { write(file, bytes, true); }
 
 }  // namespace roslam

@@ -1,31 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/dense/surface_file.hpp"
 
-#include <array>
-#include <bit>
-#include <cstring>
 #include <set>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "roslam/common/binary.hpp"
 #include "roslam/common/write_file.hpp"
 #include "roslam/dense/ply_reader.hpp"
 
 namespace roslam {
 
 namespace {
-static_assert(std::endian::native == std::endian::little, "the headers promise little-endian values");
-
-template <typename Value>
-void append(std::string& bytes, const Value& value) {
-  std::array<char, sizeof(Value)> raw;
-  std::memcpy(raw.data(), &value, sizeof(Value));
-  bytes.append(raw.data(), raw.size());
-}
-
-void append(std::string& bytes, const Eigen::Vector3f& vector) {
-  for (int i = 0; i < 3; ++i) append(bytes, vector[i]);
+void put(BinaryWriter& writer, const Eigen::Vector3f& vector) {
+  for (const float value : vector) writer.put(value);
 }
 }  // namespace
 
@@ -44,40 +33,42 @@ void write_surface_ply(const std::filesystem::path& file, const SurfaceMap& surf
     bytes += "element face " + std::to_string(surface.triangles.size()) +
              "\nproperty list uchar uint vertex_indices\n";
   }
-  bytes += "end_header\n";
+  BinaryWriter writer;
+  writer.put_bytes(bytes + "end_header\n");
   for (const SurfacePoint& point : surface.points) {
-    append(bytes, point.position);
-    append(bytes, point.normal);
-    for (int c = 2; c >= 0; --c) append(bytes, point.colour[c]);
-    append(bytes, point.label);
-    append(bytes, point.provenance);
+    put(writer, point.position);
+    put(writer, point.normal);
+    for (int c = 2; c >= 0; --c) writer.put(point.colour[c]);
+    writer.put(point.label);
+    writer.put(static_cast<std::uint8_t>(point.provenance));
   }
   if (with_triangles) {
     for (const auto& triangle : surface.triangles) {
-      append(bytes, std::uint8_t{3});
-      append(bytes, triangle);
+      writer.put(std::uint8_t{3});
+      for (const std::uint32_t corner : triangle) writer.put(corner);
     }
   }
-  replace_file(file, bytes);
+  replace_file(file, writer.bytes());
 }
 
 void write_surface_pcd(const std::filesystem::path& file, const SurfaceMap& surface) {
   const std::string count = std::to_string(surface.points.size());
-  std::string bytes =
+  BinaryWriter writer;
+  writer.put_bytes(
       "# .PCD v0.7 - RO-SLAM dense map, world frame, metres\nVERSION 0.7\n"
       "FIELDS x y z rgb normal_x normal_y normal_z label provenance\n"
       "SIZE 4 4 4 4 4 4 4 4 4\nTYPE F F F U F F F U U\nCOUNT 1 1 1 1 1 1 1 1 1\n"
       "WIDTH " +
-      count + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + count + "\nDATA binary\n";
+      count + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + count + "\nDATA binary\n");
   for (const SurfacePoint& point : surface.points) {
-    append(bytes, point.position);
+    put(writer, point.position);
     const cv::Vec3b& bgr = point.colour;
-    append(bytes, static_cast<std::uint32_t>(bgr[2] << 16 | bgr[1] << 8 | bgr[0]));
-    append(bytes, point.normal);
-    append(bytes, std::uint32_t{point.label});
-    append(bytes, static_cast<std::uint32_t>(point.provenance));
+    writer.put(static_cast<std::uint32_t>(bgr[2] << 16 | bgr[1] << 8 | bgr[0]));
+    put(writer, point.normal);
+    writer.put(std::uint32_t{point.label});
+    writer.put(static_cast<std::uint32_t>(point.provenance));
   }
-  replace_file(file, bytes);
+  replace_file(file, writer.bytes());
 }
 
 namespace {

@@ -42,7 +42,9 @@ void BrightnessNormaliser::update(const cv::Mat& grey) {
   constexpr double kHold = 1.25;      // change of the gain from which a new one is taken
   constexpr int kDark = 64;
   const Range range = range_in_use(grey);
-  const double gain = std::clamp(kEnough / std::max(range.high - range.low, 1), 1.0, kMostGain);
+  // An image of one colour has nothing to stretch.
+  const int used = range.high - range.low;
+  const double gain = used == 0 ? 1.0 : std::clamp(kEnough / used, 1.0, kMostGain);
   if (gain > 1.0) ++(range.high < kDark ? dark_ : flat_);
   const bool fits =
       gain < gain_ * kHold && gain > gain_ / kHold && std::abs(range.low - offset_) < kEnough / 4;

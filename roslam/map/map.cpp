@@ -14,6 +14,19 @@ namespace {
 // A landmark is still recognised slightly nearer and farther than the pyramid levels alone would allow.
 constexpr float kNearTolerance = 0.8F;
 constexpr float kFarTolerance = 1.2F;
+
+auto* at(const auto& elements, auto id) {
+  return id.index() < elements.size() ? elements[id.index()].get() : nullptr;
+}
+
+template <typename Id>
+std::vector<Id> ids_of(const auto& elements) {
+  std::vector<Id> ids;
+  for (const auto& element : elements) {
+    if (element) ids.push_back(element->id);
+  }
+  return ids;
+}
 }  // namespace
 
 KeyframeId Map::add_keyframe(std::size_t frame_index, double timestamp, const SE3& T_camera_world,
@@ -188,21 +201,10 @@ void Map::merge_landmarks(LandmarkId from, LandmarkId into) {
   refresh(into);
 }
 
-Keyframe* Map::find(KeyframeId id) {
-  return id.index() < keyframes_.size() ? keyframes_[id.index()].get() : nullptr;
-}
-
-const Keyframe* Map::find(KeyframeId id) const {
-  return id.index() < keyframes_.size() ? keyframes_[id.index()].get() : nullptr;
-}
-
-Landmark* Map::find(LandmarkId id) {
-  return id.index() < landmarks_.size() ? landmarks_[id.index()].get() : nullptr;
-}
-
-const Landmark* Map::find(LandmarkId id) const {
-  return id.index() < landmarks_.size() ? landmarks_[id.index()].get() : nullptr;
-}
+Keyframe* Map::find(KeyframeId id) { return at(keyframes_, id); }
+const Keyframe* Map::find(KeyframeId id) const { return at(keyframes_, id); }
+Landmark* Map::find(LandmarkId id) { return at(landmarks_, id); }
+const Landmark* Map::find(LandmarkId id) const { return at(landmarks_, id); }
 
 LandmarkId Map::resolve(LandmarkId id) const {
   while (id.index() < merged_into_.size() && merged_into_[id.index()].is_valid())
@@ -294,20 +296,7 @@ std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId id, int min_sh
   return result;
 }
 
-std::vector<KeyframeId> Map::keyframe_ids() const {
-  std::vector<KeyframeId> ids;
-  for (const auto& keyframe : keyframes_) {
-    if (keyframe) ids.push_back(keyframe->id);
-  }
-  return ids;
-}
-
-std::vector<LandmarkId> Map::landmark_ids() const {
-  std::vector<LandmarkId> ids;
-  for (const auto& landmark : landmarks_) {
-    if (landmark) ids.push_back(landmark->id);
-  }
-  return ids;
-}
+std::vector<KeyframeId> Map::keyframe_ids() const { return ids_of<KeyframeId>(keyframes_); }
+std::vector<LandmarkId> Map::landmark_ids() const { return ids_of<LandmarkId>(landmarks_); }
 
 }  // namespace roslam

@@ -51,19 +51,11 @@ struct Arguments {
   TrajectoryErrorOptions options;
 };
 
-fs::path file_in(const fs::path& path, const std::vector<std::string>& names) {
-  if (!fs::is_directory(path)) return path;
-  std::string wanted;
-  for (const auto& name : names) {
-    if (fs::exists(path / name)) return path / name;
-    wanted += (wanted.empty() ? "" : " or ") + name;
-  }
-  throw InputError(path.string() + ": the folder holds no " + wanted + "; name the trajectory file itself");
-}
+constexpr const char* kRemedy = "name the trajectory file itself";
 
 std::vector<NamedPath> parse_all(const std::vector<std::string>& arguments) {
   std::vector<NamedPath> all = parse_named(arguments);
-  for (auto& named : all) named.path = file_in(named.path, {"trajectory.txt"});
+  for (auto& named : all) named.path = file_in(named.path, {"trajectory.txt"}, kRemedy);
   return all;
 }
 
@@ -103,7 +95,7 @@ void run(const Arguments& arguments) {
   TrajectoryReport report;
   report.options = arguments.options;
   report.options.alignment = arguments.scale ? AlignmentModel::kSimilarity : AlignmentModel::kRigid;
-  const fs::path truth_file = file_in(arguments.truth, {"groundtruth.txt", "trajectory.txt"});
+  const fs::path truth_file = file_in(arguments.truth, {"groundtruth.txt", "trajectory.txt"}, kRemedy);
   const Trajectory truth = read_and_note(truth_file).trajectory;
   report.truth_file = truth_file.string();
   auto estimates = parse_all(arguments.estimates);

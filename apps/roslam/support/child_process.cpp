@@ -31,7 +31,7 @@ class SpawnSettings {
     // In a process group of its own the child does not get the terminal's SIGINT as well: this process
     // forwards a stop, and a second signal would end the child at once.
     posix_spawnattr_setpgroup(&attributes_, 0);
-    // This process blocks SIGINT and SIGTERM in its threads; the child must not inherit that.
+    // This process blocks the signals of InterruptWatcher in its threads; the child must not inherit that.
     sigset_t none;
     sigemptyset(&none);
     posix_spawnattr_setsigmask(&attributes_, &none);

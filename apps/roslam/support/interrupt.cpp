@@ -14,14 +14,6 @@
 namespace roslam::app {
 
 namespace {
-sigset_t watched_signals() {
-  sigset_t set;
-  sigemptyset(&set);
-  sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGTERM);
-  return set;
-}
-
 /// Libraries (OpenBLAS is one) start threads before main() that do not block the signals, and the kernel may
 /// give one of them what is meant for the watcher. Such a thread passes it on and takes none from then on.
 void pass_on(int signal, siginfo_t* /*info*/, void* context) {
@@ -31,14 +23,20 @@ void pass_on(int signal, siginfo_t* /*info*/, void* context) {
 }  // namespace
 
 InterruptWatcher::InterruptWatcher(Signals signals) : expected_(signals) {
-  const sigset_t set = watched_signals();
-  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  sigemptyset(&watched_);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction before {};
+    sigaction(signal, nullptr, &before);
+    if (signal == SIGHUP && before.sa_handler == SIG_IGN) continue;
+    before_[signal] = before;
+    sigaddset(&watched_, signal);
+  }
+  pthread_sigmask(SIG_BLOCK, &watched_, nullptr);
   struct sigaction passing {};
   passing.sa_sigaction = pass_on;
   passing.sa_flags = SA_SIGINFO | SA_RESTART;
-  sigaction(SIGINT, &passing, &interrupt_before_);
-  sigaction(SIGTERM, &passing, &terminate_before_);
-  signals_ = signalfd(-1, &set, SFD_CLOEXEC);
+  for (const auto& [signal, before] : before_) sigaction(signal, &passing, nullptr);
+  signals_ = signalfd(-1, &watched_, SFD_CLOEXEC);
   leave_ = eventfd(0, EFD_CLOEXEC);
   thread_ = std::jthread([this] { watch(); });
 }
@@ -48,10 +46,8 @@ InterruptWatcher::~InterruptWatcher() {
   if (write(leave_, &one, sizeof(one)) == sizeof(one)) thread_.join();
   close(signals_);
   close(leave_);
-  sigaction(SIGINT, &interrupt_before_, nullptr);
-  sigaction(SIGTERM, &terminate_before_, nullptr);
-  const sigset_t set = watched_signals();
-  pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
+  for (const auto& [signal, before] : before_) sigaction(signal, &before, nullptr);
+  pthread_sigmask(SIG_UNBLOCK, &watched_, nullptr);
 }
 
 void InterruptWatcher::watch() {
@@ -62,6 +58,7 @@ void InterruptWatcher::watch() {
     if (waiting[1].revents != 0) return;
     signalfd_siginfo info{};
     if (read(signals_, &info, sizeof(info)) != sizeof(info)) continue;
+    if (received > 0 && info.ssi_signo == SIGHUP) continue;
     constexpr int kInterrupted = 130;  // what shells report for a program ended by ctrl-C
     if (++received > expected_) _exit(kInterrupted);
     (received == 1 ? stop_ : urgent_stop_).request_stop();

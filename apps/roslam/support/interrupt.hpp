@@ -2,13 +2,16 @@
 #pragma once
 
 #include <csignal>
+#include <map>
 #include <stop_token>
 #include <thread>
 
 namespace roslam::app {
 
-/// Turns Ctrl-C (SIGINT) and SIGTERM into stop tokens, also where libraries have started threads already. One
-/// signal more than are asked for ends the program at once.
+/// Turns Ctrl-C (SIGINT), SIGTERM and SIGHUP, which a closed terminal sends, into stop tokens, also where
+/// libraries have started threads already. One signal more than are asked for ends the program at once.
+/// SIGHUP only ever asks for the first stop, as the kernel and the shell may both send it, and stays ignored
+/// if it was (nohup).
 class InterruptWatcher {
  public:
   /// Signals that are turned into stop tokens.
@@ -31,8 +34,8 @@ class InterruptWatcher {
   int expected_;  // signals that do not end the program
   std::stop_source stop_;
   std::stop_source urgent_stop_;
-  struct sigaction interrupt_before_ {};  // what the signals did before, and do again afterwards
-  struct sigaction terminate_before_ {};
+  std::map<int, struct sigaction> before_;  // what the signals did before, and do again afterwards
+  sigset_t watched_{};
   int signals_ = -1;  // file descriptor the signals arrive at
   int leave_ = -1;    // file descriptor that ends the thread
   std::jthread thread_;

@@ -3,6 +3,8 @@
 
 #include <map>
 
+#include "roslam/common/error.hpp"
+
 namespace roslam::app {
 
 namespace {
@@ -29,6 +31,21 @@ std::vector<NamedPath> parse_named(const std::vector<std::string>& arguments) {
   all.reserve(arguments.size());
   for (const auto& argument : arguments) all.push_back(parse_named(argument));
   return all;
+}
+
+fs::path file_in(const fs::path& path, const std::vector<std::string>& names, const std::string& remedy) {
+  std::error_code error;
+  if (!fs::is_directory(path, error)) return path;
+  std::string wanted;
+  for (const auto& name : names) {
+    if (fs::exists(path / name, error)) return path / name;
+    wanted += (wanted.empty() ? "" : " or ") + name;
+  }
+  throw InputError(path.string() + ": the folder holds no " + wanted + "; " + remedy);
+}
+
+fs::path map_file(const fs::path& path) {
+  return file_in(path, {"map.roslam"}, "give a map file or the folder of a run that was not --localise-only");
 }
 
 void make_names_unique(const std::vector<std::vector<NamedPath>*>& lists) {

@@ -13,7 +13,8 @@ namespace roslam::app {
 /// cannot be written in full.
 void write_image_fast(const std::filesystem::path& file, const cv::Mat& image);
 
-/// Flushes stdout. Throws OutputError if anything written to it was lost.
+/// Flushes stdout. Throws OutputError if anything written to it was lost, except where nobody reads it any
+/// more: a closed pipe, a terminal that vanished.
 void require_written_output();
 
 /// Reasons with their counts, as the end of an error message: "; 3 x no depth; 1 x truncated".

@@ -31,7 +31,7 @@ void remove_result(const fs::path& path) {
 fs::path prepared(const fs::path& folder) {
   RestoredFolder::require_usable(folder);
   make_folder(folder);
-  for (const char* name : {"rgb", "depth", kProvenance, "before_after.jpg", "depth.txt"})
+  for (const char* name : {"rgb", "depth", kProvenance, "before_after.jpg", "rgb.txt", "depth.txt"})
     remove_result(folder / name);
   for (const char* name : {"rgb", "depth", kProvenance}) make_folder(folder / name);
   write_file(folder / kReport, "{}\n");

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <system_error>
 #include <utility>
 
 #include "roslam/common/error.hpp"
@@ -17,7 +18,26 @@ cv::Mat packed_depth(const cv::Mat& depth, double units_per_metre) {
   return image;
 }
 
-TextFile::TextFile(std::filesystem::path file) : file_(std::move(file)), stream_(file_) { check(); }
+namespace {
+std::filesystem::path part_of(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto old = std::filesystem::status(file, error);
+  if (std::filesystem::exists(old) && !std::filesystem::is_regular_file(old)) return file;
+  return std::filesystem::path(file) += ".part";
+}
+}  // namespace
+
+TextFile::TextFile(std::filesystem::path file)
+    : file_(std::move(file)), part_(part_of(file_)), stream_(part_) {
+  check();
+  std::error_code error;
+  if (part_ != file_) std::filesystem::remove(file_, error);
+}
+
+TextFile::~TextFile() {
+  std::error_code error;
+  if (!is_whole_ && part_ != file_) std::filesystem::remove(part_, error);
+}
 
 void TextFile::line(const std::string& text) {
   stream_ << text << "\n";
@@ -27,6 +47,10 @@ void TextFile::line(const std::string& text) {
 void TextFile::close() {
   stream_.close();
   check();
+  std::error_code error;
+  if (part_ != file_) std::filesystem::rename(part_, file_, error);
+  if (error) throw OutputError(file_.string() + ": cannot be written: " + error.message());
+  is_whole_ = true;
 }
 
 void TextFile::check() const {
