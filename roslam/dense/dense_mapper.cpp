@@ -2,9 +2,7 @@
 #include "roslam/dense/dense_mapper.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "roslam/common/error.hpp"

@@ -4,7 +4,6 @@
 #include <octomap/OcTree.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <exception>
 #include <sstream>

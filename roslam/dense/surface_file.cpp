@@ -24,11 +24,11 @@ void write_surface_ply(const std::filesystem::path& file, const SurfaceMap& surf
       "comment label: Cityscapes train id, 255 unknown; provenance: 0 measured, 128 reprojected, 255 "
       "inpainted\n"
       "comment spacing " +
-      std::to_string(surface.spacing) + "\nelement vertex " + std::to_string(surface.points.size()) +
-      "\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float "
-      "ny\nproperty "
-      "float nz\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar "
-      "label\nproperty uchar provenance\n";
+      std::to_string(surface.spacing) + "\nelement vertex " + std::to_string(surface.points.size()) + "\n";
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"})
+    bytes += std::string("property float ") + name + "\n";
+  for (const char* name : {"red", "green", "blue", "label", "provenance"})
+    bytes += std::string("property uchar ") + name + "\n";
   if (with_triangles) {
     bytes += "element face " + std::to_string(surface.triangles.size()) +
              "\nproperty list uchar uint vertex_indices\n";

@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/dense/surface_map.hpp"
 
-#include <cstdint>
-#include <limits>
-
 namespace roslam {
-
-namespace {
-constexpr std::uint32_t kNoPoint = std::numeric_limits<std::uint32_t>::max();
-}
 
 SurfaceMap filter_points(const SurfaceMap& surface, const std::vector<bool>& keep) {
   SurfaceMap result;
   result.spacing = surface.spacing;
-  std::vector<std::uint32_t> moved(surface.points.size(), kNoPoint);
+  std::vector<std::uint32_t> moved(surface.points.size());
   for (std::size_t i = 0; i < surface.points.size(); ++i) {
     if (!keep[i]) continue;
     moved[i] = static_cast<std::uint32_t>(result.points.size());
@@ -33,7 +26,6 @@ std::map<Provenance, std::size_t> count_by_provenance(const SurfaceMap& surface)
 
 SurfaceMap without_inpainted(const SurfaceMap& surface) {
   std::vector<bool> keep;
-  keep.reserve(surface.points.size());
   for (const SurfacePoint& point : surface.points) keep.push_back(point.provenance != Provenance::kInpainted);
   return filter_points(surface, keep);
 }

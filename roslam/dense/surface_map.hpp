@@ -33,8 +33,9 @@ struct ROSLAM_EXPORT SurfaceMap {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// Extracts the zero level set of a TSDF by naive surface nets (Gibson 1998): a point in each cube of eight
-/// voxels that the surface crosses, two triangles around each voxel edge that it cuts.
+/// Extracts the zero level set of a TSDF by surface nets (Gibson 1998): a point for each patch of surface in
+/// a cube of eight voxels (Nielson 2004), two triangles around each voxel edge that it cuts. At most two
+/// triangles share an edge, in opposite directions; normals of points and triangles agree.
 ROSLAM_EXPORT SurfaceMap extract_surface(const TsdfVolume& map, const DenseOptions& options);
 
 /// The points with keep set, and the triangles whose corners are all kept. keep: one entry for each point.

@@ -2,7 +2,6 @@
 #include "roslam/dynamic_objects/cell_grid.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 namespace roslam {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/dynamic_objects/mask_refinement.hpp"
 
-#include <algorithm>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 

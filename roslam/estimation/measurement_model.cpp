@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/estimation/measurement_model.hpp"
 
-#include <cmath>
-
 #include "roslam/common/error.hpp"
 
 namespace roslam {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <random>
 
 #include "roslam/common/error.hpp"

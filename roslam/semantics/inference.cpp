@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/semantics/inference.hpp"
 
-#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <opencv2/dnn.hpp>

@@ -2,11 +2,9 @@
 #include "roslam/semantics/pspnet_segmenter.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <opencv2/dnn.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
-#include <system_error>
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/resources.hpp"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/semantics/segmenter_options.hpp"
 
-#include <string>
-
 #include "roslam/common/error.hpp"
 
 namespace roslam {

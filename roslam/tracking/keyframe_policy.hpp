@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstddef>
-
 #include "roslam/map/map.hpp"
 #include "roslam/tracking/tracker.hpp"
 #include "roslam/tracking/tracking_options.hpp"
