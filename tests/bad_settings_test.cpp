@@ -22,8 +22,12 @@ class BadSettings : public Dataset {
 };
 
 std::string camera_with(const std::string& key, const std::string& value) {
-  std::map<std::string, std::string> values{{"width", "640"}, {"height", "480"}, {"fx", "385"},
-                                            {"fy", "385"},    {"cx", "319.5"},   {"cy", "239.5"},
+  std::map<std::string, std::string> values{{"width", "640"},
+                                            {"height", "480"},
+                                            {"fx", "385"},
+                                            {"fy", "385"},
+                                            {"cx", "319.5"},
+                                            {"cy", "239.5"},
                                             {"depth_units_per_metre", "1000"}};
   values[key] = value;
   std::string text;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/interrupt.hpp"
 #include "apps/roslam/support/output.hpp"
 #include "apps/roslam/support/progress.hpp"
 #include "apps/roslam/support/tum_writer.hpp"
@@ -50,6 +51,7 @@ Writes to the folder of --out; images are named after their timestamp in seconds
   instances/              16 bit: number of the moving object, 0 = none
   background/rgb, depth   the same images without movable objects, parked cars included
 
+Ctrl-C ends it early and keeps the frames written so far.
 Exit code: 0 success, 1 an error in the input, 2 wrong usage.)";
 
 std::string pose_line(double timestamp, const SE3& pose) {
@@ -73,6 +75,7 @@ void write_images(const fs::path& out, const std::string& name, const SimulatedV
 }
 
 void simulate(const SimulateArguments& arguments) {
+  const InterruptWatcher interrupt;
   SimulatorOptions options;
   options.path = *flight_path_from(arguments.path);
   options.traffic = *traffic_level_from(arguments.traffic);
@@ -96,14 +99,15 @@ void simulate(const SimulateArguments& arguments) {
   depths.line("# timestamp filename");
   poses.line("# timestamp tx ty tz qx qy qz qw");
   Progress progress(simulator.size());
-  for (std::size_t i = 0; i < simulator.size(); ++i) {
-    const SimulatedView view = simulator.render(i, SimulatedParts::kBackground);
+  std::size_t written = 0;
+  for (; written < simulator.size() && !interrupt.token().stop_requested(); ++written) {
+    const SimulatedView view = simulator.render(written, SimulatedParts::kBackground);
     const std::string time = time_text(view.frame.timestamp);
     write_images(arguments.out, time + ".png", view, simulator.camera());
     colours.line(time + " rgb/" + time + ".png");
     depths.line(time + " depth/" + time + ".png");
     poses.line(pose_line(view.frame.timestamp, *view.frame.T_world_camera));
-    progress.show(i + 1, "rendered");
+    progress.show(written + 1, "rendered");
   }
   colours.close();
   depths.close();
@@ -112,11 +116,12 @@ void simulate(const SimulateArguments& arguments) {
   if (arguments.json) {
     const nlohmann::json summary{{"out", arguments.out.string()}, {"path", arguments.path},
                                  {"traffic", arguments.traffic},  {"depth", arguments.depth},
-                                 {"seed", arguments.seed},        {"frames", simulator.size()},
+                                 {"seed", arguments.seed},        {"frames", written},
                                  {"fps", simulator.camera().fps}, {"seconds", seconds}};
     std::cout << summary.dump() << "\n";
   } else {
-    std::cout << "wrote " << simulator.size() << " frames to " << arguments.out.string() << "\n";
+    std::cout << "wrote " << written << " frames to " << arguments.out.string()
+              << (written < simulator.size() ? ", interrupted" : "") << "\n";
   }
   require_written_output();
 }

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/place_recognition/geometric_verifier.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
+#include <random>
 #include <string>
 
 #include "roslam/common/error.hpp"
@@ -10,10 +15,80 @@
 namespace roslam {
 
 namespace {
-SE3 from_rodrigues(const cv::Mat& rotation, const cv::Mat& translation) {
-  const Eigen::Vector3d omega(rotation.at<double>(0), rotation.at<double>(1), rotation.at<double>(2));
-  return {so3_exp(omega),
-          Eigen::Vector3d(translation.at<double>(0), translation.at<double>(1), translation.at<double>(2))};
+// A landmark and the point of the frame it was matched with.
+struct PointPair {
+  Eigen::Vector3d landmark;   // world frame, metres
+  Eigen::Vector3d in_camera;  // as the frame measured it, metres
+  Eigen::Vector2d pixel;
+  double tolerance;  // of distances to it, metres; infinite without depth
+  float turn;        // of the image around it, from keyframe to frame, degrees
+};
+using Sample = std::array<const PointPair*, 4>;  // P3P takes three, and one to choose among its solutions
+
+// One pose turns the image around all points about equally, and a rigid transformation keeps distances.
+bool can_agree(const PointPair& a, const PointPair& b) {
+  constexpr float kMaxTurn = 30.0F;  // degrees: noise of ORB's orientation, and perspective
+  if (std::abs(std::remainder(a.turn - b.turn, 360.0F)) > kMaxTurn) return false;
+  const double difference = (a.landmark - b.landmark).norm() - (a.in_camera - b.in_camera).norm();
+  return std::abs(difference) <= a.tolerance + b.tolerance;
+}
+
+// Draws pairs that can agree. False if the first ones do not, as in nearly all samples with a wrong match:
+// they cost a thousandth of P3P.
+bool draw(const std::vector<PointPair>& pairs, std::mt19937& random, Sample& sample) {
+  for (std::size_t n = 0; n < sample.size(); ++n) {
+    sample[n] = &pairs[random() % pairs.size()];
+    for (std::size_t k = 0; k < n; ++k)
+      if (sample[k] == sample[n] || !can_agree(*sample[k], *sample[n])) return false;
+  }
+  return true;
+}
+
+std::optional<SE3> solve_p3p(const Sample& sample, const Camera& camera) {
+  std::vector<cv::Point3d> points;
+  std::vector<cv::Point2d> pixels;
+  for (const PointPair* pair : sample) {
+    points.emplace_back(pair->landmark.x(), pair->landmark.y(), pair->landmark.z());
+    pixels.emplace_back(pair->pixel.x(), pair->pixel.y());
+  }
+  const cv::Matx33d matrix(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
+  cv::Vec3d omega;
+  cv::Vec3d translation;
+  try {
+    if (!cv::solvePnP(points, pixels, matrix, cv::noArray(), omega, translation, false, cv::SOLVEPNP_P3P))
+      return std::nullopt;
+  } catch (const cv::Exception&) {  // a degenerate sample
+    return std::nullopt;
+  }
+  const SE3 pose(so3_exp({omega[0], omega[1], omega[2]}), {translation[0], translation[1], translation[2]});
+  return pose.is_finite() ? std::make_optional(pose) : std::nullopt;
+}
+
+// RANSAC: the pairs that agree on the best pose, and that pose.
+std::vector<std::size_t> find_agreeing(const std::vector<PointPair>& pairs, const Camera& camera,
+                                       const GeometricVerifierOptions& options, SE3& T_camera_world) {
+  constexpr double kMiss = 0.001;  // probability that no sample is free of outliers, at which it ends
+  std::mt19937 random;             // default seed: the same result in every run
+  Sample sample{};
+  std::vector<std::size_t> best;
+  double samples = options.iterations;
+  for (int n = 0; n < samples; ++n) {
+    if (!draw(pairs, random, sample)) continue;
+    const auto pose = solve_p3p(sample, camera);
+    if (!pose) continue;
+    std::vector<std::size_t> agreeing;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const Eigen::Vector3d point = *pose * pairs[i].landmark;
+      if (point.z() > 0.0 && (camera.project(point) - pairs[i].pixel).norm() <= options.max_error)
+        agreeing.push_back(i);
+    }
+    if (agreeing.size() <= best.size()) continue;
+    best = std::move(agreeing);
+    T_camera_world = *pose;
+    const double share = static_cast<double>(best.size()) / static_cast<double>(pairs.size());
+    samples = std::min(samples, std::log(kMiss) / std::log1p(-std::pow(share, 4)));
+  }
+  return best;
 }
 }  // namespace
 
@@ -82,32 +157,22 @@ std::optional<VerifiedMatch> GeometricVerifier::recognise(const KeyframeSnapshot
   if (static_cast<int>(matches.size()) < options.min_matches) return std::nullopt;
   std::vector<std::size_t> entry_of(snapshot.view->size());  // position of each point in snapshot.points
   for (std::size_t k = 0; k < snapshot.points.size(); ++k) entry_of[snapshot.points[k]] = k;
-  std::vector<cv::Point3d> points;
-  std::vector<cv::Point2d> pixels;
+  std::vector<PointPair> pairs;
   for (const auto& [in_keyframe, in_frame] : matches) {
-    const Eigen::Vector3d& p = snapshot.positions[entry_of[in_keyframe]];
-    points.emplace_back(p.x(), p.y(), p.z());
-    pixels.emplace_back(frame.pixels[in_frame].x(), frame.pixels[in_frame].y());
+    const Eigen::Vector2d pixel = frame.pixels[in_frame].cast<double>();
+    const auto z = static_cast<double>(frame.depths[in_frame]);
+    const double tolerance = 2.0 * settings_.noise.sigma_of_depth(z) + z * options.max_error / camera_.fx;
+    pairs.push_back({snapshot.positions[entry_of[in_keyframe]], camera_.unproject(pixel, z), pixel,
+                     z > 0.0 ? tolerance : std::numeric_limits<double>::infinity(),
+                     frame.angles[in_frame] - snapshot.view->angles[in_keyframe]});
   }
-  const cv::Matx33d matrix(camera_.fx, 0, camera_.cx, 0, camera_.fy, camera_.cy, 0, 0, 1);
-  cv::Mat rotation;
-  cv::Mat translation;
-  std::vector<int> inliers;
-  constexpr double kConfidence = 0.999;
-  bool is_found = false;
-  try {
-    is_found = cv::solvePnPRansac(points, pixels, matrix, cv::noArray(), rotation, translation, false,
-                                  options.iterations, static_cast<float>(options.max_error), kConfidence,
-                                  inliers, cv::SOLVEPNP_P3P);
-  } catch (const cv::Exception&) {  // a degenerate sample
-    return std::nullopt;
-  }
-  if (!is_found || static_cast<int>(inliers.size()) < options.min_agreeing) return std::nullopt;
-  VerifiedMatch result{snapshot.keyframe, from_rodrigues(rotation, translation),
-                       std::vector<LandmarkId>(frame.size()), static_cast<int>(inliers.size())};
-  if (!result.T_camera_world.is_finite()) return std::nullopt;
-  for (const int i : inliers) {
-    const auto& [in_keyframe, in_frame] = matches[static_cast<std::size_t>(i)];
+  SE3 T_camera_world;
+  const auto agreeing = find_agreeing(pairs, camera_, options, T_camera_world);
+  if (static_cast<int>(agreeing.size()) < options.min_agreeing) return std::nullopt;
+  VerifiedMatch result{snapshot.keyframe, T_camera_world, std::vector<LandmarkId>(frame.size()),
+                       static_cast<int>(agreeing.size())};
+  for (const std::size_t i : agreeing) {
+    const auto& [in_keyframe, in_frame] = matches[i];
     result.landmarks[in_frame] = snapshot.landmarks[entry_of[in_keyframe]];
   }
   return result;

@@ -10,7 +10,7 @@ struct ROSLAM_EXPORT GeometricVerifierOptions {
   double match_ratio = 0.9;    ///< best to second best distance, over the whole image
   int min_matches = 15;        ///< matches with a keyframe required for a pose estimate
   int min_agreeing = 7;        ///< RANSAC inliers required of these
-  int iterations = 1000;       ///< RANSAC samples per keyframe, at most
+  int iterations = 10000;      ///< RANSAC samples per keyframe, at most; few of them cost P3P
   double max_error = 4.0;      ///< pixels, reprojection error of a RANSAC inlier
   int neighbours = 10;         ///< covisible keyframes whose landmarks are also searched for
   double search_radius = 8.0;  ///< pixels at the finest level, around landmarks projected by the first pose

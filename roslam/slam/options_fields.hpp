@@ -57,6 +57,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("local_map", "max_keyframes", o.local_map.max_keyframes);
   visit("local_map", "neighbours", o.local_map.neighbours);
   visit("relocaliser", "min_inliers", o.relocaliser.min_inliers);
+  visit("relocaliser", "tries", o.relocaliser.tries);
   visit("relocaliser", "candidates", o.relocaliser.candidates);
   visit("tracker", "min_initial_points", o.tracker.min_initial_points);
   visit("tracker", "min_inliers", o.tracker.min_inliers);

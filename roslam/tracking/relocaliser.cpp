@@ -9,29 +9,37 @@ namespace roslam {
 
 void RelocaliserOptions::validate() const {
   if (candidates < 1) throw OptionsError("relocaliser.candidates must be at least 1");
+  if (tries < 1) throw OptionsError("relocaliser.tries must be at least 1");
   if (min_inliers < 6) throw OptionsError("relocaliser.min_inliers must be at least 6");
 }
 
 std::optional<VerifiedMatch> Relocaliser::find(const Map& map, const ObservedFrame& frame,
                                                std::span<const KeyframeId> similar, bool search_all) {
   const auto candidates = static_cast<std::size_t>(options_.candidates);
-  const auto by_similarity = similar.first(std::min(similar.size(), candidates));
-  for (const KeyframeId id : by_similarity) {
+  std::vector<KeyframeId> others = map.keyframe_ids();
+  std::reverse(others.begin(), others.end());
+  if (!search_all) others.resize(std::min(others.size(), candidates));
+  choose(similar.first(std::min(similar.size(), candidates)), others);
+  for (const KeyframeId id : chosen_) {
     if (auto match = verifier_.match(map, id, frame, options_.min_inliers)) return match;
   }
-  std::vector<KeyframeId> keyframes = map.keyframe_ids();
-  std::reverse(keyframes.begin(), keyframes.end());
-  if (keyframes.empty()) return std::nullopt;
-  if (!search_all) next_ = 0;
-  const auto tries = std::min(candidates, keyframes.size());
-  for (std::size_t i = 0; i < tries; ++i) {
-    const KeyframeId id = keyframes[(next_ + i) % keyframes.size()];
-    const bool is_tried = std::find(by_similarity.begin(), by_similarity.end(), id) != by_similarity.end();
-    if (is_tried) continue;
-    if (auto match = verifier_.match(map, id, frame, options_.min_inliers)) return match;
-  }
-  if (search_all) next_ = (next_ + tries) % keyframes.size();
   return std::nullopt;
+}
+
+// The most similar keyframe in every frame; alternately one of the others and one of the similar ones in
+// turn.
+void Relocaliser::choose(std::span<const KeyframeId> similar, std::span<const KeyframeId> others) {
+  chosen_.clear();
+  const auto add = [this](KeyframeId id) {
+    if (std::find(chosen_.begin(), chosen_.end(), id) == chosen_.end()) chosen_.push_back(id);
+  };
+  if (!similar.empty()) add(similar.front());
+  const std::size_t rounds = std::max(similar.size(), others.size());
+  const auto is_full = [this] { return chosen_.size() >= static_cast<std::size_t>(options_.tries); };
+  for (std::size_t round = 0; round < rounds && !is_full(); ++round) {
+    if (!others.empty()) add(others[next_other_++ % others.size()]);
+    if (similar.size() > 1 && !is_full()) add(similar[1 + next_similar_++ % (similar.size() - 1)]);
+  }
 }
 
 }  // namespace roslam

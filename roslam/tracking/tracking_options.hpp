@@ -33,7 +33,8 @@ struct ROSLAM_EXPORT LocalMapOptions {
 };
 
 struct ROSLAM_EXPORT RelocaliserOptions {
-  int candidates = 4;    ///< similar keyframes tried for one frame, and as many others
+  int tries = 6;         ///< keyframes verified for one frame, at most
+  int candidates = 4;    ///< similar keyframes that are tried in turn, and as many of the newest
   int min_inliers = 40;  ///< landmarks that must agree on the pose
 
   /// Throws OptionsError naming the field.
