@@ -16,16 +16,18 @@ namespace roslam::recording {
 
 namespace {
 namespace fs = std::filesystem;
-constexpr const char* kMark = ".roslam";  // holds the command that wrote the folder
+constexpr const char* kMark = ".roslam";  // a line "COMMAND NAME" for each file or folder written
 
 const fs::path& created(const fs::path& folder) {
   make_folder(folder);
   return folder;
 }
 
-bool is_marked_by(const fs::path& folder, const std::string& command) {
-  std::string word;
-  return std::getline(std::ifstream(folder / kMark), word) && word == "roslam " + command;
+std::set<std::string> read_marks(const fs::path& folder) {
+  std::set<std::string> marks;
+  std::ifstream in(folder / kMark);
+  for (std::string line; std::getline(in, line);) marks.insert(line);
+  return marks;
 }
 }  // namespace
 
@@ -43,13 +45,10 @@ FolderLock::~FolderLock() {
 
 OutputFolder::OutputFolder(const fs::path& path, const std::string& command,
                            const std::vector<std::string>& names, bool overwrite)
-    : path_(created(path)),
-      command_(command),
-      lock_(path),
-      may_replace_(overwrite || is_marked_by(path, command)) {
+    : path_(created(path)), command_(command), lock_(path), overwrites_(overwrite), marks_(read_marks(path)) {
   for (const auto& name : names) require_free(name);
-  write_file(path_ / kMark, "roslam " + command + "\n");
   for (const auto& name : names) {
+    claim(name);
     std::error_code error;
     const bool is_file = fs::is_regular_file(path_ / name, error);
     error.clear();  // it need not exist
@@ -58,11 +57,22 @@ OutputFolder::OutputFolder(const fs::path& path, const std::string& command,
   }
 }
 
-void OutputFolder::require_free(const fs::path& name) const {
+void OutputFolder::require_free(const std::string& name) const {
   std::error_code error;
-  if (may_replace_ || !fs::exists(path_ / name, error)) return;
-  throw OutputError(path_.string() + ": holds " + name.string() + ", which roslam " + command_ +
+  const fs::file_status there = fs::status(path_ / name, error);
+  if (!fs::is_regular_file(there) && !fs::is_directory(there)) return;
+  if (overwrites_ || marks_.count(command_ + " " + name) > 0) return;
+  throw OutputError(path_.string() + ": holds " + name + ", which roslam " + command_ +
                     " did not write; choose another --out, or replace it with --overwrite");
+}
+
+void OutputFolder::claim(const std::string& name) {
+  require_free(name);
+  const std::string mark = command_ + " " + name;
+  if (!marks_.insert(mark).second) return;
+  std::ofstream out(path_ / kMark, std::ios::app);
+  if (!(out << mark << "\n").flush())
+    throw OutputError((path_ / kMark).string() + ": cannot be written; check the folder and the disk");
 }
 
 }  // namespace roslam::recording

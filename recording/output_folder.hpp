@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -25,8 +26,8 @@ class FolderLock {
 /// anybody else are not touched, unless the user asked for it.
 class OutputFolder {
  public:
-  /// Creates and locks the folder and marks it as the command's. names: files and folders that will be
-  /// written; files of an earlier call are removed, as they must not pass for results of this one. Throws
+  /// Creates and locks the folder and notes in it what the command writes. names: files and folders that will
+  /// be written; files of an earlier call are removed, as they must not pass for results of this one. Throws
   /// OutputError if another process writes to the folder or if a name exists that the command did not write
   /// and overwrite is false.
   OutputFolder(const std::filesystem::path& path, const std::string& command,
@@ -34,15 +35,18 @@ class OutputFolder {
 
   const std::filesystem::path& path() const { return path_; }
 
-  /// Throws OutputError unless a file may be written: it does not exist, or is the command's own, or
+  /// Claims a further file or folder. Throws OutputError unless it does not exist, is the command's own, or
   /// overwrite.
-  void require_free(const std::filesystem::path& name) const;
+  void claim(const std::string& name);
 
  private:
+  void require_free(const std::string& name) const;
+
   std::filesystem::path path_;
   std::string command_;
   FolderLock lock_;
-  bool may_replace_;
+  bool overwrites_;
+  std::set<std::string> marks_;  // "COMMAND NAME" of what was written, also by other commands
 };
 
 }  // namespace roslam::recording

@@ -69,15 +69,32 @@ std::string new_id() {
   return std::string(text.data()) + "-" + std::to_string(getpid()) + "-" + std::to_string(nanoseconds);
 }
 
-void move_away(const Path& folder, const Path& name) {
+bool is_same(const Path& a, const Path& b) {
   std::error_code error;
-  if (!std::filesystem::exists(folder / name, error)) return;
-  make_folder(folder / kPrevious);
-  std::filesystem::remove_all(folder / kPrevious / name, error);
-  std::filesystem::rename(folder / name, folder / kPrevious / name, error);
-  if (error) {
-    throw OutputError((folder / name).string() +
-                      ": left by an earlier run and cannot be moved away; choose another --out");
+  return !b.empty() && std::filesystem::equivalent(a, b, error);
+}
+
+// Moves the results of an earlier run to previous/, as a whole: what is there is of the run before and goes.
+// An earlier run that was killed before it wrote a trajectory leaves nothing worth that.
+void move_away(const Path& folder, const Path& kept) {
+  std::error_code error;
+  const Path previous = folder / kPrevious;
+  const bool has_results = std::filesystem::exists(folder / "trajectory.txt", error);
+  if (has_results) make_folder(previous);
+  for (const char* name : kResults) {
+    if (is_same(folder / name, kept)) continue;
+    if (has_results) std::filesystem::remove_all(previous / name, error);
+    error.clear();
+    if (!std::filesystem::exists(folder / name, error)) continue;
+    if (has_results) {
+      std::filesystem::rename(folder / name, previous / name, error);
+    } else {
+      std::filesystem::remove_all(folder / name, error);
+    }
+    if (error) {
+      throw OutputError((folder / name).string() +
+                        ": left by an earlier run and cannot be moved away; choose another --out");
+    }
   }
 }
 
@@ -121,12 +138,12 @@ RunFolder::RunFolder(const std::filesystem::path& path, bool overwrite) : path_(
 }
 
 void RunFolder::begin(RunDescription& description, const Camera& camera) const {
-  std::error_code error;
   for (const char* name : kResults) {
-    const bool is_input =
-        !description.map.empty() && std::filesystem::equivalent(path_ / name, description.map, error);
-    if (!is_input) move_away(path_, name);
+    if (is_same(path_ / kPrevious / name, description.map))
+      throw OutputError(description.map + ": would be replaced by the results in " + path_.string() +
+                        "; copy it or choose another --out");
   }
+  move_away(path_, description.map);
   description.id = new_id();
   nlohmann::ordered_json json;
   json["run"] = description.id;

@@ -67,6 +67,7 @@ TEST(Brightness, ABlackImageStaysBlack) {
   const cv::Mat black = cv::Mat::zeros(480, 640, CV_8UC1);
   normaliser.update(black);
   EXPECT_EQ(cv::countNonZero(normaliser.apply(black)), 0);
+  EXPECT_EQ(normaliser.dark(), 0u) << "there is nothing to stretch";
 }
 
 }  // namespace

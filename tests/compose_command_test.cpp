@@ -138,7 +138,7 @@ TEST_F(ComposeCommand, TheSameSeedGivesTheSameBytes) {
         differs || (name.parent_path() == "rgb" && content(folder_ / "c" / name) != content(entry.path()));
     ++files;
   }
-  EXPECT_EQ(files, 4u * kFrames + 7u);
+  EXPECT_EQ(files, 4u * kFrames + 8u);
   EXPECT_TRUE(differs);
 }
 

@@ -42,8 +42,8 @@ TEST_F(DenseRun, HasAReportToLookAt) {
   frames_of_run();
   const std::string html = content(run_ / "report.html");
   for (const char* words :
-       {"<h2>Trajectory</h2>", "<h2>Dense map</h2>", "<h2>Processor time</h2>", "frames tracked",
-        "10 of 10 (100.0 %)", "dense.fuse", "max_memory", "From above."})
+       {"<h2>Trajectory</h2>", "<h2>Dense map</h2>", "<h2>Processor time</h2>",
+        "tracked 10 of 10 frames of the source (100.0 %)", "dense.fuse", "max_memory", "From above."})
     EXPECT_NE(html.find(words), std::string::npos) << words;
   EXPECT_EQ(html.find("http"), std::string::npos);  // it asks for nothing from elsewhere
 }
@@ -112,15 +112,16 @@ TEST_F(DenseRun, DoesWithoutDepth) {
   EXPECT_EQ(points(), 0U);
 }
 
-TEST_F(DenseRun, KeepsTheOldMapWhereTheNewOneCannotBeWritten) {
+TEST_F(DenseRun, TheEarlierMapDoesNotPassForANewOneThatCannotBeWritten) {
   frames_of_run();
   const std::string before = content(run_ / "dense.ply");
   const std::string report_before = content(run_ / "report.html");
   for (const char* file : {"dense.ply", "report.html"})
     fs::create_directory(run_ / (std::string(file) + ".part"));  // in the way of the new one
   expect_refused(run(), {"dense.ply"});
-  EXPECT_TRUE(content(run_ / "dense.ply") == before);
-  EXPECT_TRUE(content(run_ / "report.html") == report_before);
+  EXPECT_FALSE(is_there("dense.ply") || is_there("report.html"));
+  EXPECT_TRUE(content(run_ / "previous/dense.ply") == before);
+  EXPECT_TRUE(content(run_ / "previous/report.html") == report_before);
   EXPECT_EQ(trajectory().size(), kFrames);
 }
 

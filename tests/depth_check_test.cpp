@@ -79,6 +79,30 @@ TEST(DepthCheck, IsSilentWhereDepthBelongsToColour) {
   EXPECT_EQ(alarms_of([&](int i) { return scene.at(i + 2).depth; }), "") << "the delay of a real sensor";
 }
 
+TEST(DepthCheck, IsSilentWithoutEvidence) {
+  const PannedBoxes scene;
+  const auto mirrored = [&] { return flipped(scene.at(0).depth, 1); };
+  DepthCheck at_rest(525.0);
+  for (int frame = 0; frame < 200; ++frame) at_rest.add(scene.at(0).grey, mirrored(), frame / 30.0);
+  EXPECT_TRUE(at_rest.alarms().empty()) << "the same image again is no further evidence";
+  EXPECT_EQ(alarms_of([](int) { return cv::Mat::zeros(480, 640, CV_32FC1); }), "") << "nothing in range";
+  const auto sparse = [&](int i) {
+    cv::Mat depth = cv::Mat::zeros(480, 640, CV_32FC1);
+    for (int y = 0; y < 480; y += 40) scene.at(i).depth.row(y).copyTo(depth.row(y));
+    return depth;
+  };
+  EXPECT_EQ(alarms_of(sparse), "");
+}
+
+TEST(DepthCheck, AGapInTheMiddleDoesNoHarm) {
+  const PannedBoxes scene;
+  DepthCheck check(525.0);
+  for (int frame = 0; frame < 140; ++frame)
+    check.add(scene.at(frame).grey, scene.at(std::max(frame - 15, 0)).depth,
+              frame / 30.0 + (frame > 63 ? 3.0 : 0.0));
+  ASSERT_LE(check.alarms().size(), 1u);
+}
+
 TEST(DepthCheck, NamesWhatIsWrong) {
   const PannedBoxes scene;
   const auto depth = [&](int i) { return scene.at(i).depth; };
@@ -91,7 +115,7 @@ TEST(DepthCheck, NamesWhatIsWrong) {
       {"are ahead of the colour images by about 0.5 s", [&](int i) { return depth(i + 15); }},
       {"does not change", [&](int) { return depth(0); }},
       {"same all over the image", [&](int) { return cv::Mat(480, 640, CV_32FC1, cv::Scalar(2.0)); }},
-      {"implausibly small", [&](int i) { return cv::Mat(depth(i) / 6.0); }}};
+      {"implausibly small", [&](int i) { return cv::Mat(depth(i) / 9.0); }}};
   for (const auto& [words, change] : faults) {
     const std::string alarms = alarms_of(change);
     EXPECT_NE(alarms.find(words), std::string::npos) << words << ": " << alarms;

@@ -76,6 +76,16 @@ class FrameTimes : public testing::Test {
   double time_ = 100.0;
 };
 
+TEST_F(FrameTimes, AnotherSegmentOfTheSourceIsAResetOfTheClock) {
+  for (const double timestamp : {10.0, 9.9, 50.0}) {
+    Frame frame = at(timestamp);
+    frame.segment = timestamp == 10.0 ? 0 : timestamp == 9.9 ? 1 : 2;
+    const auto verdict = gate_.check(frame, {});
+    EXPECT_EQ(verdict.reason, RejectReason::kNone) << timestamp;
+    EXPECT_EQ(verdict.is_clock_reset, timestamp != 10.0) << timestamp;
+  }
+}
+
 TEST_F(FrameTimes, RejectsImagesOfWrongTypeOrSizeWithTheirReason) {
   using enum RejectReason;
   expect_rejected(kNoColour, [](Frame& f, cv::Mat&) { f.colour.release(); });

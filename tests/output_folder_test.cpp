@@ -63,6 +63,18 @@ TEST_F(OutputFolders, ResultsOfAnotherCommandAreNotReplaced) {
   EXPECT_THROW(OutputFolder(folder_, "compose", names_, false), OutputError);
 }
 
+TEST_F(OutputFolders, WhatTheCommandDidNotWriteStaysInAFolderOfIts) {
+  {
+    OutputFolder folder(folder_, "segment", {"labels.json"}, false);
+    folder.claim("a.png");
+    write_file(folder_ / "a.png", "own\n");
+  }
+  write_file(folder_ / "b.png", "mine\n");
+  OutputFolder again(folder_, "segment", {"labels.json"}, false);
+  EXPECT_NO_THROW(again.claim("a.png"));
+  EXPECT_THROW(again.claim("b.png"), OutputError);
+}
+
 TEST_F(OutputFolders, TwoProcessesCannotWriteToOne) {
   fs::create_directories(folder_);
   int ready[2];

@@ -60,6 +60,38 @@ TEST(RunFolder, ARunThatBeginsMovesEarlierResultsAway) {
   EXPECT_NE(content(folder / "previous/run.json").find("earlier"), std::string::npos);
 }
 
+TEST(RunFolder, EarlierResultsStayTogether) {
+  const fs::path folder = scratch_path();
+  const auto run = [&](const std::string& name, bool ends) {
+    RunDescription description;
+    description.source = name;
+    description.version = "0";
+    const RunFolder results(folder);
+    results.begin(description, Camera{});
+    if (ends) write_file(folder / "trajectory.txt", name);
+    if (ends && name == "first") write_file(folder / "dense.ply", name);
+  };
+  run("first", true);
+  run("killed", false);
+  EXPECT_EQ(content(folder / "previous/trajectory.txt"), "first");
+  run("third", true);
+  EXPECT_EQ(content(folder / "previous/trajectory.txt"), "first") << "a killed run has no results to keep";
+  EXPECT_NE(content(folder / "previous/run.json").find("first"), std::string::npos);
+  run("fourth", true);
+  EXPECT_EQ(content(folder / "previous/trajectory.txt"), "third");
+  EXPECT_FALSE(fs::exists(folder / "previous/dense.ply")) << "of the first run";
+}
+
+TEST(RunFolder, RefusesToReplaceTheMapThatItIsToContinue) {
+  const fs::path folder = scratch_path();
+  fs::create_directories(folder / "previous");
+  write_file(folder / "previous/map.roslam", "earlier\n");
+  RunDescription description;
+  description.map = (folder / "previous/map.roslam").string();
+  EXPECT_THROW(RunFolder(folder).begin(description, Camera{}), OutputError);
+  EXPECT_TRUE(fs::exists(folder / "previous/map.roslam"));
+}
+
 TEST(RunFolder, TheMapThatIsContinuedStays) {
   const fs::path folder = scratch_path();
   fs::create_directories(folder);

@@ -45,6 +45,29 @@ TEST(OrderOfTime, AnyPermutationOfARecordingIsSorted) {
   }
 }
 
+// As ls sorts names without leading zeros.
+TEST(OrderOfTime, TheOrderOfTextIsSorted) {
+  for (const double begin : {0.0, 95.0}) {
+    const std::vector<double> times = regular(begin, 900, 1.0 / 30.0);
+    std::vector<double> as_text = times;
+    std::sort(as_text.begin(), as_text.end(),
+              [](double a, double b) { return std::to_string(a) < std::to_string(b); });
+    const OrderedFiles ordered = in_order_of_time(at(as_text));
+    EXPECT_EQ(times_of(ordered), times) << begin;
+    EXPECT_EQ(ordered.restarts, 0);
+    EXPECT_FALSE(ordered.was_sorted);
+  }
+}
+
+TEST(OrderOfTime, NoShuffleIsTakenForARestart) {
+  const std::vector<double> times = regular(10.0, 1000);
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    std::vector<double> shuffled = times;
+    std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937(seed));
+    EXPECT_EQ(times_of(in_order_of_time(at(shuffled))), times) << seed;
+  }
+}
+
 TEST(OrderOfTime, ARestartOfTheClockIsNotSortedAway) {
   for (const double second : {100.05, 0.0, 101.0, 5.0}) {
     std::vector<double> times = regular(100.0, 40);

@@ -180,12 +180,14 @@ TEST_F(FrameLog, ASubmapWhoseLandmarksAreOnObjectsIsFound) {
     frame.T_camera_world = at(0.0).inverse();
     frame.reference = reference;
     log_.add(frame, index, map_);
-    log_.add_evidence(frame, map_, {100, on_objects});
+    log_.add_evidence({100, on_objects});
   };
   for (std::size_t i = 0; i < 10; ++i) add_with(i, on_person, i < 3 ? 0 : 90);
   EXPECT_TRUE(log_.submaps_on_objects(map_).empty()) << "the only submap is the main one";
   for (std::size_t i = 10; i < 30; ++i) add_with(i, on_wall, 20);
   EXPECT_EQ(log_.submaps_on_objects(map_), std::set<SubmapId>{SubmapId{0}});
+  map_.merge_submaps(SubmapId{0}, SubmapId{1});
+  EXPECT_TRUE(log_.submaps_on_objects(map_).empty()) << "what was found static stays";
 }
 
 TEST_F(FrameLog, FramesWithoutAPoseDoNotMakeASubmapTheMainOne) {

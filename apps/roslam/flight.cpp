@@ -61,8 +61,7 @@ RunResults track(FrameSource& source, Slam& slam, std::optional<RemovalLog>& log
       source, slam,
       [&](const Frame& frame, const FrameResult& result) {
         if (log) log->add(frame, result);
-        for (const std::string& warning : result.warnings)
-          std::fprintf(stderr, "warning: %s\n", warning.c_str());
+        for (const std::string& warning : result.warnings) progress.print("warning: " + warning);
         if (start_up_seconds < 0.0 && result.T_world_camera) start_up_seconds = process_age();
         progress.show(result.index + 1, name_of(result.state));
       },
@@ -145,7 +144,7 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   flight.description.source = arguments.source.name;
   flight.description.camera = arguments.source.camera;
   flight.description.version = version;
-  flight.description.map = arguments.map;
+  if (!arguments.map.empty()) flight.description.map = map_file(arguments.map).string();
   flight.description.flight = flight_in_words(arguments.source);
   if (flight.slam->options().dynamic_objects.labels)
     flight.description.segmentation_model =

@@ -14,6 +14,7 @@
 #include "apps/roslam/support/named_path.hpp"
 #include "apps/roslam/support/output.hpp"
 #include "apps/roslam/support/progress.hpp"
+#include "apps/roslam/support/replaces_only.hpp"
 #include "apps/roslam/support/sources.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/common/write_file.hpp"
@@ -189,7 +190,9 @@ void add_merge_command(CLI::App& map) {
                    "Two or more maps of the same camera: map files (map.roslam) or folders of runs")
       ->required()
       ->expected(2, 1000);
-  command->add_option("--out", arguments->out, "File the merged map is written to")->required();
+  command->add_option("--out", arguments->out, "File the merged map is written to")
+      ->required()
+      ->check(ReplacesOnly({"ROSLAMMP"}));
   command->add_option("--vocabulary", arguments->vocabulary,
                       "Vocabulary for place recognition (roslam vocabulary train); default the shipped one");
   command->add_option("--config", arguments->config, "YAML file with options, as for roslam run");
@@ -288,26 +291,33 @@ void add_export_command(CLI::App& map) {
   CLI::App* command = map.add_subcommand("export", "Export a map to PLY, PCD, OctoMap and TUM files");
   command->footer(kExportExamples);
   command->add_option("MAP", arguments->map, "map.roslam, dense map (PLY) or folder of a run")->required();
-  command->add_option("--ply", dense.ply,
-                      "Write coloured points (binary PLY): of a dense map, with normals, labels and "
-                      "provenance, else landmarks");
-  command->add_option("--mesh", dense.mesh, "Write points and triangles of a dense map (binary PLY)");
-  command->add_option("--pcd", dense.pcd, "Write points of a dense map (binary PCD)");
+  command
+      ->add_option("--ply", dense.ply,
+                   "Write coloured points (binary PLY): of a dense map, with normals, labels and "
+                   "provenance, else landmarks")
+      ->check(ReplacesOnly({"ply"}));
+  command->add_option("--mesh", dense.mesh, "Write points and triangles of a dense map (binary PLY)")
+      ->check(ReplacesOnly({"ply"}));
+  command->add_option("--pcd", dense.pcd, "Write points of a dense map (binary PCD)")
+      ->check(ReplacesOnly({"# .PCD"}));
   command
       ->add_option("--octomap", dense.octomap,
                    "Write occupancy of a dense map: .bt (binary OctoMap) or .ot (with probabilities)")
-      ->check(octomap_ending);
+      ->check(octomap_ending)
+      ->check(ReplacesOnly({"# Octomap"}));
   command
       ->add_option("--resolution", dense.resolution,
                    "Cell size of --octomap, metres; default that of dense.bt, else twice the point spacing, "
                    "at least 0.05")
       ->check(CLI::Range(0.001, 10.0));
   command->add_flag("--no-inpainted,--no-invented", dense.no_inpainted, "Leave out inpainted points");
-  command->add_option("--keyframes", arguments->keyframes,
-                      "Write the keyframe poses of a session (TUM format)");
+  command
+      ->add_option("--keyframes", arguments->keyframes, "Write the keyframe poses of a session (TUM format)")
+      ->check(ReplacesOnly({"# timestamp tx"}));
   command->add_option("--session,--flight", arguments->session,
                       "Session whose keyframes are written, counted from 0; default the newest");
-  command->add_option("--camera", arguments->camera, "Write the camera parameters (YAML)");
+  command->add_option("--camera", arguments->camera, "Write the camera parameters (YAML)")
+      ->check(ReplacesOnly({"model:"}));
   command->callback([arguments] { export_map(*arguments); });
 }
 }  // namespace

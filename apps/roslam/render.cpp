@@ -10,6 +10,7 @@
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/named_path.hpp"
 #include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/replaces_only.hpp"
 #include "recording/map_render.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/dense/surface_file.hpp"
@@ -106,7 +107,9 @@ void add_render_command(CLI::App& program) {
   command->footer(kExamples);
   command->add_option("MAP", arguments->map, "Dense map (PLY), or folder of a run: its dense.ply")
       ->required();
-  command->add_option("--out", arguments->out, "Image file to write, PNG or JPEG")->required();
+  command->add_option("--out", arguments->out, "Image file to write, PNG or JPEG")
+      ->required()
+      ->check(replaces_only_images());
   command->add_option("--view", arguments->view, "Viewpoint: top, front or follow")
       ->check(CLI::IsMember({"top", "front", "follow"}))
       ->capture_default_str();

@@ -135,7 +135,7 @@ void print_summary(const SegmentArguments& arguments, const LabelStatistics& fou
   std::cout << "results: " << arguments.out.string() << "\n";
 }
 
-LabelStatistics label_all(const SegmentArguments& arguments, const recording::OutputFolder& out,
+LabelStatistics label_all(const SegmentArguments& arguments, recording::OutputFolder& out,
                           const LabelSet& set, ImageSource& source, Segmenter& segmenter,
                           const std::stop_token& stop) {
   LabelStatistics found;
@@ -145,8 +145,8 @@ LabelStatistics label_all(const SegmentArguments& arguments, const recording::Ou
     if (!image) break;
     const fs::path labels = image->name + ".png";
     const fs::path overlay = fs::path("overlay") / (image->name + ".jpg");
-    out.require_free(labels);
-    if (arguments.overlay) out.require_free(overlay);
+    out.claim(labels);
+    if (arguments.overlay) out.claim(overlay);
     const Segmentation segmentation = segmenter.segment(image->image);
     found.add(segmentation);
     write_image_fast(arguments.out / labels, relabel(segmentation.labels, set));
@@ -166,7 +166,7 @@ void segment(const SegmentArguments& arguments) {
   PspnetSegmenter segmenter(model, arguments.options, arguments.backend);
   const auto source = open_images({arguments.inputs.begin(), arguments.inputs.end()});
   protect_inputs(arguments);
-  const recording::OutputFolder out(arguments.out, "segment", {"labels.json"}, arguments.overwrite);
+  recording::OutputFolder out(arguments.out, "segment", {"labels.json"}, arguments.overwrite);
   if (arguments.overlay) make_folder(arguments.out / "overlay");
   const LabelStatistics found = label_all(arguments, out, set, *source, segmenter, interrupt.token());
   const bool interrupted = interrupt.token().stop_requested();

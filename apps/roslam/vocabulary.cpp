@@ -15,6 +15,7 @@
 #include "apps/roslam/support/interrupt.hpp"
 #include "apps/roslam/support/output.hpp"
 #include "apps/roslam/support/progress.hpp"
+#include "apps/roslam/support/replaces_only.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/features/orb_extractor.hpp"
 
@@ -94,7 +95,9 @@ void add_train_command(CLI::App& vocabulary) {
   command
       ->add_option("IMAGES", arguments->inputs, "Images, folders of images, TUM RGB-D folders, or one video")
       ->required();
-  command->add_option("--out", arguments->out, "File the vocabulary is written to")->required();
+  command->add_option("--out", arguments->out, "File the vocabulary is written to")
+      ->required()
+      ->check(ReplacesOnly({"ROSLAMVO"}));
   command->add_option("--features", arguments->orb.features, "ORB points per image")
       ->check(CLI::Range(10, 100000))
       ->capture_default_str();

@@ -42,6 +42,7 @@ void BrightnessNormaliser::update(const cv::Mat& grey) {
   constexpr double kHold = 1.25;      // change of the gain from which a new one is taken
   constexpr int kDark = 64;
   const Range range = range_in_use(grey);
+  ++frames_;
   // An image of one colour has nothing to stretch.
   const int used = range.high - range.low;
   const double gain = used == 0 ? 1.0 : std::clamp(kEnough / used, 1.0, kMostGain);

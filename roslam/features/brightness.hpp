@@ -20,6 +20,8 @@ class BrightnessNormaliser {
   /// The image (CV_8UC1 or CV_8UC3) of the frame with its contrast stretched; itself if not is_on().
   cv::Mat apply(const cv::Mat& image) const;
 
+  std::size_t frames() const { return frames_; }  ///< so far
+
   /// Frames so far that were dark, and those of little contrast that were not.
   std::size_t dark() const { return dark_; }
   std::size_t flat() const { return flat_; }
@@ -28,6 +30,7 @@ class BrightnessNormaliser {
   cv::Mat table_;  // CV_8UC1, 256 values; empty: no stretch
   double gain_ = 1.0;
   double offset_ = 0.0;  // grey value that stays as it is
+  std::size_t frames_ = 0;
   std::size_t dark_ = 0;
   std::size_t flat_ = 0;
 };

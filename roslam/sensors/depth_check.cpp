@@ -16,6 +16,7 @@ constexpr double kInterval = 0.09;    // seconds between samples
 constexpr std::size_t kHistory = 11;  // samples, a second
 constexpr std::size_t kLeastLag = 2;  // samples; less may be the delay of a real sensor
 constexpr std::size_t kWindow = 30;   // samples that are judged together
+constexpr std::size_t kFrames = 90;   // the window of tracking
 constexpr std::size_t kLeastSamples = 12;
 constexpr std::size_t kFlips = 3;
 constexpr std::array<const char*, kFlips> kFlipNames{"mirrored left to right", "mirrored upside down",
@@ -109,9 +110,9 @@ double percentile(std::vector<float>& values, double share) {
 }
 
 template <typename Value>
-void push(std::deque<Value>& values, Value value) {
+void push(std::deque<Value>& values, Value value, std::size_t most) {
   values.push_back(std::move(value));
-  if (values.size() > kWindow) values.pop_front();
+  if (values.size() > most) values.pop_front();
 }
 
 template <typename... Values>
@@ -129,45 +130,52 @@ double median_of(const std::deque<double>& values) {
 
 void DepthCheck::restart_clock() {
   history_.clear();
+  verdicts_.clear();
   last_timestamp_.reset();
 }
 
 void DepthCheck::add(const cv::Mat& grey, const cv::Mat& depth, double timestamp) {
+  constexpr double kLongestGap = 2.0;  // seconds
   if (depth.empty() || (last_timestamp_ && timestamp - *last_timestamp_ < kInterval)) return;
-  if (last_timestamp_ && timestamp - *last_timestamp_ > 2.0) history_.clear();
+  if (last_timestamp_ && timestamp - *last_timestamp_ > kLongestGap) restart_clock();
   last_timestamp_ = timestamp;
   cv::Mat small_grey;
   cv::Mat small_depth;
   cv::resize(grey, small_grey, small_size(grey), 0, 0, cv::INTER_AREA);
   cv::resize(depth, small_depth, small_grey.size(), 0, 0, cv::INTER_NEAREST);
-  check_frozen(small_grey, small_depth);
-  check_scale(small_depth, depth);
   history_.push_back({timestamp, gradient_rank(small_grey), depth_edges(small_depth)});
   if (history_.size() > kHistory) history_.pop_front();
+  // Samples of a camera at rest show the same again and are no further evidence.
+  constexpr double kMoved = 1.5;  // grey values, mean difference
+  const bool has_moved =
+      last_grey_.size() != small_grey.size() ||
+      cv::norm(small_grey, last_grey_, cv::NORM_L1) > kMoved * static_cast<double>(small_grey.total());
+  if (!has_moved) return;
+  last_grey_ = small_grey;
+  check_frozen(small_depth);
+  check_scale(small_depth, depth);
   if (auto verdict = compare(history_.back())) {
-    push(verdicts_, std::move(*verdict));
+    push(verdicts_, std::move(*verdict), kWindow);
     judge();
   }
 }
 
 void DepthCheck::note_tracking(bool is_tracked, bool is_keyframe) {
-  push(troubles_, !is_tracked || is_keyframe);
+  push(troubles_, !is_tracked || is_keyframe, kFrames);
 }
 
-void DepthCheck::check_frozen(const cv::Mat& grey, const cv::Mat& depth) {
-  constexpr int kSamples = 10;  // in a row
-  const bool has_last = last_depth_.size() == depth.size();
-  const bool is_same = has_last && cv::norm(depth, last_depth_, cv::NORM_INF) == 0.0;
-  const bool has_moved =
-      has_last && cv::norm(grey, last_grey_, cv::NORM_L1) > static_cast<double>(grey.total());
-  if (!is_same) frozen_ = 0;
-  frozen_ += is_same && has_moved ? 1 : 0;
-  last_depth_ = depth;
-  last_grey_ = grey;
+void DepthCheck::check_frozen(const cv::Mat& depth) {
+  constexpr int kSamples = 10;        // in a row
+  constexpr double kKnown = 0.1;      // of the image
+  constexpr double kConstant = 1e-3;  // of the depth
   std::vector<float> known = known_depths(depth);
-  constexpr double kFlat = 1e-3;  // of the depth
-  const bool is_constant = known.size() > depth.total() / 4 &&
-                           percentile(known, 0.95) - percentile(known, 0.05) < kFlat * percentile(known, 0.5);
+  const bool is_known = static_cast<double>(known.size()) > kKnown * static_cast<double>(depth.total());
+  const bool is_same =
+      is_known && last_depth_.size() == depth.size() && cv::norm(depth, last_depth_, cv::NORM_INF) == 0.0;
+  const bool is_constant =
+      is_known && percentile(known, 0.95) - percentile(known, 0.05) < kConstant * percentile(known, 0.5);
+  last_depth_ = depth;
+  frozen_ = is_same ? frozen_ + 1 : 0;
   constant_ = is_constant ? constant_ + 1 : 0;
   if (constant_ >= kSamples)
     raise("the depth is the same all over the image; check the depth images", is_misfit_);
@@ -182,8 +190,8 @@ void DepthCheck::check_scale(const cv::Mat& small, const cv::Mat& depth) {
   constexpr std::size_t kEvery = 5;     // samples
   std::vector<float> known = known_depths(small);
   if (known.size() < small.total() / 10) return;
-  push(near_, percentile(known, 0.95));
-  push(medians_, percentile(known, 0.5));
+  push(near_, percentile(known, 0.95), kWindow);
+  push(medians_, percentile(known, 0.5), kWindow);
   if (samples_++ % kEvery == 0 && !is_large_) {
     scale_.add(depth, fx_);
     const auto baseline = scale_.implausible_baseline();
@@ -193,7 +201,7 @@ void DepthCheck::check_scale(const cv::Mat& small, const cv::Mat& depth) {
                     *baseline),
             is_large_);
   }
-  if (near_.size() < kLeastSamples) return;
+  if (near_.size() < kLeastSamples + kHistory) return;
   if (median_of(near_) > kNear && median_of(medians_) > kMedianNear) return;
   raise(text_of("depth is implausibly small: 95 %% of the image within %.2f m, half within %.2f m; "
                 "depth_units_per_metre is probably too large",
@@ -251,7 +259,8 @@ DepthCheck::Alternative DepthCheck::best_alternative() const {
 }
 
 void DepthCheck::judge() {
-  if (verdicts_.size() < kLeastSamples + kHistory || is_misfit_) return;  // all alternatives are known by then
+  if (verdicts_.size() < kLeastSamples + kHistory || is_misfit_)
+    return;  // all alternatives are known by then
   const Alternative best = best_alternative();
   if (best.advantage > 0.0 && best.index < kFlips) {
     raise(std::string("the depth images are ") + kFlipNames[best.index] + " against the colour images",
@@ -269,7 +278,7 @@ void DepthCheck::judge() {
     double registered = 0.0;
     for (const auto& verdict : verdicts_) registered += verdict.registered / static_cast<double>(kWindow);
     const auto troubles = static_cast<double>(std::count(troubles_.begin(), troubles_.end(), true));
-    if (registered < kUnrelated && troubles >= kTrouble * static_cast<double>(kWindow))
+    if (registered < kUnrelated && troubles >= kTrouble * static_cast<double>(troubles_.size()))
       raise("the depth images do not belong to the colour images: their edges do not coincide", is_misfit_);
   }
 }

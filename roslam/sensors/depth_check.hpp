@@ -47,7 +47,7 @@ class DepthCheck {
   };
 
   void check_scale(const cv::Mat& small, const cv::Mat& depth);
-  void check_frozen(const cv::Mat& grey, const cv::Mat& depth);
+  void check_frozen(const cv::Mat& depth);
   std::optional<Verdict> compare(const Sample& sample) const;
   struct Alternative {
     std::size_t index = 0;

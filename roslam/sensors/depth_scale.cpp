@@ -107,10 +107,11 @@ std::optional<double> DepthScale::implausible_baseline() const {
   if (images_ < kFewestImages) return std::nullopt;
   // Baseline (metres) over k * fx: 0.02 to 0.04 of a Kinect, 0.07 of a D435, 0.3 of a D455, 0.3 of stereo of
   // 0.11 m in steps of 1/16 pixel.
-  constexpr double kImplausible = 0.45;
+  constexpr double kImplausible = 0.55;
+  constexpr double kShortest = 0.16;  // metres; shorter ones are plausible in themselves
   const auto factor = step_factor();
   const auto width = baseline();
-  return factor && width && *width > kImplausible * *factor ? width : std::nullopt;
+  return factor && width && *width > std::max(kShortest, kImplausible * *factor) ? width : std::nullopt;
 }
 
 }  // namespace roslam

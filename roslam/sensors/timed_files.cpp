@@ -2,13 +2,13 @@
 #include "roslam/sensors/timed_files.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <charconv>
 #include <cmath>
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -130,22 +130,32 @@ std::vector<std::size_t> segments_of(const std::vector<TimedFile>& entries) {
   return bounds;
 }
 
-// True if the segments join to one recording without overlap or gap when they are sorted: then it is the
-// lines that are out of order, not the clock.
-bool are_parts_of_one(const std::vector<TimedFile>& entries, const std::vector<std::size_t>& bounds) {
-  constexpr double kLongestGap = 5.0;  // intervals
-  std::vector<std::pair<double, double>> ranges;
-  for (std::size_t s = 0; s + 1 < bounds.size(); ++s) {
-    const auto [first, last] =
-        std::minmax_element(entries.begin() + static_cast<std::ptrdiff_t>(bounds[s]),
-                            entries.begin() + static_cast<std::ptrdiff_t>(bounds[s + 1]), is_earlier);
-    ranges.emplace_back(first->timestamp, last->timestamp);
+// Median step from one line to the next, of those that lead to a later time.
+double median_step(const std::vector<TimedFile>& entries) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < entries.size(); ++i) {
+    const double step = entries[i].timestamp - entries[i - 1].timestamp;
+    if (step > 0.0) steps.push_back(step);
   }
-  std::sort(ranges.begin(), ranges.end());
-  const double longest = kLongestGap * median_interval(entries);
-  for (std::size_t s = 1; s < ranges.size(); ++s) {
-    const double gap = ranges[s].first - ranges[s - 1].second;
-    if (gap <= 0.0 || gap > longest) return false;
+  return steps.empty() ? 0.0 : upper_median(steps);
+}
+
+// True if the times are those of one recording without overlap or gap when they are sorted: then it is the
+// lines that are out of order, not the clock. Where the clock restarted, times of the segments lie between
+// one another; in a shuffled list the steps from line to line are much larger than the intervals.
+bool are_of_one_recording(const std::vector<TimedFile>& entries) {
+  constexpr double kShuffled = 4.0;  // intervals from line to line
+  constexpr double kShortest = 0.6;  // of the steps from line to line, where the list is not shuffled
+  constexpr double kLongest = 5.0;
+  const double interval = median_interval(entries);
+  const double step = median_step(entries);
+  const double shortest = step > kShuffled * interval ? 0.0 : kShortest * step;
+  std::vector<double> times;
+  for (const auto& entry : entries) times.push_back(entry.timestamp);
+  std::sort(times.begin(), times.end());
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    const double gap = times[i] - times[i - 1];
+    if (gap < shortest || gap > kLongest * interval) return false;
   }
   return true;
 }
@@ -225,44 +235,43 @@ TimedFileList read_timed_files(const fs::path& list_file) {
 }
 
 double median_interval(const std::vector<TimedFile>& entries) {
-  std::vector<double> times;
-  for (const auto& entry : entries) times.push_back(entry.timestamp);
-  std::sort(times.begin(), times.end());
-  times.erase(std::unique(times.begin(), times.end()), times.end());
-  std::adjacent_difference(times.begin(), times.end(), times.begin());
-  if (times.size() < 2) return 0.0;
-  times.erase(times.begin());
-  return upper_median(times);
+  std::map<int, std::vector<double>> times;  // by segment
+  for (const auto& entry : entries) times[entry.segment].push_back(entry.timestamp);
+  std::vector<double> intervals;
+  for (auto& [segment, all] : times) {
+    std::sort(all.begin(), all.end());
+    for (std::size_t i = 1; i < all.size(); ++i) {
+      if (all[i] > all[i - 1]) intervals.push_back(all[i] - all[i - 1]);
+    }
+  }
+  return intervals.empty() ? 0.0 : upper_median(intervals);
 }
 
 TimeUnit time_unit_of(const std::vector<TimedFile>& entries, double fps) {
   constexpr std::size_t kFewest = 5;
+  constexpr double kMostFrames = 1e8;  // number of a frame
   const double interval = median_interval(entries);
   if (entries.size() < kFewest || interval <= 0.0) return {};
-  // Consecutive whole numbers are no seconds, unless the camera takes so few images.
-  constexpr double kFewFrames = 5.0;  // a second
-  constexpr double kMaxStep = 10.0;   // frames from one that was recorded to the next
-  constexpr double kMostFrames = 1e8;
   const bool is_whole = std::all_of(entries.begin(), entries.end(), [](const TimedFile& entry) {
     return entry.timestamp == std::round(entry.timestamp) && std::abs(entry.timestamp) < kMostFrames;
   });
-  if (is_whole && interval <= kMaxStep && interval * fps >= kFewFrames)
-    return {1.0 / fps, "numbers of frames"};
-  // The units are a factor of 1000 apart: up to 100 times fewer images than the camera's rate, or 10 times as
-  // many, leave no doubt which it is.
-  constexpr double kMostSkipped = 100.0;
-  constexpr std::array<TimeUnit, 4> kUnits{
-      {{1.0, "seconds"}, {1e-3, "milliseconds"}, {1e-6, "microseconds"}, {1e-9, "nanoseconds"}}};
-  for (const TimeUnit& unit : kUnits) {
-    if (interval * unit.seconds * fps < kMostSkipped) return unit;
-  }
-  return kUnits.back();
+  std::vector<TimeUnit> units{
+      {1.0, "seconds"}, {1e-3, "milliseconds"}, {1e-6, "microseconds"}, {1e-9, "nanoseconds"}};
+  if (is_whole) units.push_back({1.0 / fps, "numbers of frames"});
+  // A recording may lack images of the camera, but hardly has more than it takes.
+  constexpr double kMoreImages = 3.0;
+  const auto distance = [&](const TimeUnit& unit) {
+    const double missing = std::log(interval * unit.seconds * fps);
+    return missing >= 0.0 ? missing : -kMoreImages * missing;
+  };
+  return *std::min_element(units.begin(), units.end(),
+                           [&](const TimeUnit& a, const TimeUnit& b) { return distance(a) < distance(b); });
 }
 
 OrderedFiles in_order_of_time(std::vector<TimedFile> entries) {
   OrderedFiles ordered;
   std::vector<std::size_t> bounds = segments_of(entries);
-  if (bounds.size() > 2 && are_parts_of_one(entries, bounds)) bounds = {0, entries.size()};
+  if (bounds.size() > 2 && are_of_one_recording(entries)) bounds = {0, entries.size()};
   ordered.restarts = static_cast<int>(bounds.size()) - 2;
   for (std::size_t s = 0; s + 1 < bounds.size(); ++s) {
     std::vector<TimedFile> segment(

@@ -13,7 +13,7 @@ namespace roslam {
 
 /// One line of a list of images, such as rgb.txt.
 struct ROSLAM_EXPORT TimedFile {
-  double timestamp = 0.0;      ///< seconds; before with_seconds() as written
+  double timestamp = 0.0;      ///< seconds; in a list just read, of the unit it is written in
   std::filesystem::path file;  ///< relative to the folder of the list
   int segment = 0;             ///< restarts of the clock before it
 };
@@ -35,11 +35,12 @@ struct TimeUnit {
   std::string_view name = "seconds";
 };
 
-/// The unit of the timestamps of a camera: of seconds, milliseconds, microseconds, nanoseconds and numbers of
-/// frames the one whose median interval is nearest to the camera's. Seconds for fewer than five entries.
+/// The unit of the timestamps of a camera: of seconds, milliseconds, microseconds, nanoseconds and, for whole
+/// numbers, numbers of frames the one whose median interval is nearest to the camera's. Seconds for fewer
+/// than five entries.
 TimeUnit time_unit_of(const std::vector<TimedFile>& entries, double fps);
 
-/// Median interval between timestamps in ascending order, in their unit; 0 for fewer than two times.
+/// Median interval between the different times of each segment, in their unit; 0 for fewer than two times.
 double median_interval(const std::vector<TimedFile>& entries);
 
 /// A list in the order of time.

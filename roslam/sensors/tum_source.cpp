@@ -96,27 +96,25 @@ void TumSource::open_lists() {
   TimedFileList colour = read_timed_files(folder_ / "rgb.txt");
   TimedFileList depth = read_timed_files(folder_ / "depth.txt");
   size_ = colour.entries.size() + colour.without_time;
+  const TimeUnit unit = time_unit_of(colour.entries, camera_.fps);
+  if (unit.seconds != 1.0) {
+    ++notes_["timestamps are " + std::string(unit.name) + " by the camera's fps; converted to seconds"];
+    for (TimedFileList* list : {&colour, &depth}) {
+      for (auto& entry : list->entries) entry.timestamp *= unit.seconds;
+    }
+  }
   colour_ = ordered("rgb.txt", "colour image", std::move(colour), skipped_);
   depth_ = ordered("depth.txt", "depth image", std::move(depth), skipped_depth_);
   const double interval = median_interval(colour_);
-  if (interval <= 0.0) return;
   constexpr double kContradiction = 1.5;
-  const double fps = 1.0 / interval;
+  const double fps = interval > 0.0 ? 1.0 / interval : camera_.fps;
   if (fps < camera_.fps * kContradiction && fps > camera_.fps / kContradiction) return;
-  ++notes_["the camera has " + in_words(camera_.fps) + " images a second, the timestamps " + in_words(fps) +
-           "; the timestamps are taken"];
-  camera_.fps = fps;
+  ++notes_["the camera has " + in_words(camera_.fps) + " images a second, the timestamps " + in_words(fps)];
 }
 
-// The lines of a list in seconds and in order.
+// The lines of a list in order.
 std::vector<TimedFile> TumSource::ordered(const char* name, const char* kind, TimedFileList list,
                                           std::map<std::string, std::size_t>& skipped) {
-  const TimeUnit unit = time_unit_of(list.entries, camera_.fps);
-  if (unit.seconds != 1.0) {
-    ++notes_[std::string("timestamps of ") + name + " are " + std::string(unit.name) +
-             " by the camera's fps; converted to seconds"];
-    for (auto& entry : list.entries) entry.timestamp *= unit.seconds;
-  }
   OrderedFiles files = in_order_of_time(std::move(list.entries));
   if (!files.was_sorted) ++notes_[std::string(name) + " was not in the order of time; sorted"];
   if (files.restarts > 0)

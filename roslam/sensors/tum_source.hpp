@@ -40,8 +40,8 @@ ROSLAM_EXPORT std::vector<int> associate_by_time(const std::vector<TimedFile>& c
 class ROSLAM_EXPORT TumSource : public FrameSource {
  public:
   /// Throws InputError if the folder or a list is missing, malformed or names no image, or if the clocks of
-  /// the lists restart at different places; CalibrationError if the camera is invalid or has no
-  /// depth_units_per_metre. Where the timestamps contradict the camera's fps by half, camera() has theirs.
+  /// the lists restart a different number of times; CalibrationError if the camera is invalid or has no
+  /// depth_units_per_metre.
   TumSource(const std::filesystem::path& folder, const Camera& camera, const TumOptions& options = {});
 
   std::optional<Frame> next() override;

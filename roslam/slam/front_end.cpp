@@ -63,7 +63,6 @@ bool FrontEnd::fills_image(const Frame& frame, const FrontEndResult& observation
 void FrontEnd::check_input(const Frame& frame, const cv::Mat& grey, FrontEndResult& observation) {
   depth_check_.add(grey, frame.depth, frame.timestamp);
   const auto all = warnings();
-  if (all.size() == warned_.size()) return;
   for (const auto& [warning, frames] : all) {
     if (warned_.insert(warning).second) observation.warnings.push_back(warning);
   }
@@ -155,11 +154,15 @@ std::map<std::string, std::size_t> FrontEnd::faults() const {
 }
 
 std::map<std::string, std::size_t> FrontEnd::warnings() const {
-  constexpr std::size_t kSeveral = 10;  // frames
+  const auto are_many = [&](std::size_t frames) {
+    constexpr std::size_t kSeveral = 10;
+    constexpr std::size_t kShare = 5;  // every fifth of all
+    return frames >= kSeveral && kShare * frames >= brightness_.frames();
+  };
   std::map<std::string, std::size_t> warnings;
-  if (brightness_.dark() >= kSeveral)
+  if (are_many(brightness_.dark()))
     warnings["the images are dark; expose longer or add light"] = brightness_.dark();
-  if (brightness_.flat() >= kSeveral)
+  if (are_many(brightness_.flat()))
     warnings["the images have little contrast; check the lens and the exposure"] = brightness_.flat();
   for (const std::string& alarm : depth_check_.alarms()) warnings[alarm] = 1;
   constexpr double kOffCentre =

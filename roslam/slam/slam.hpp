@@ -70,7 +70,8 @@ class ROSLAM_EXPORT Slam {
   void finish();
 
   /// Makes finish() return soon: queues are discarded and optimisations in progress end at their next
-  /// iteration, with what they have reached. No keyframe is mapped any more. May be called from any thread.
+  /// iteration, with what they have reached. No keyframe is mapped and no image labelled any more. May be
+  /// called from any thread.
   void cancel();
 
   /// Poses of all frames tracked in the main submap, with all later corrections of the map, in the order of

@@ -84,8 +84,7 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   tracked.hidden = count_hidden_landmarks(map, tracked, camera, result.dynamic_objects.mask);
   const KeyframeId keyframe = create_keyframe(tracked, frame.index);
   log.add(tracked, frame.index, map);
-  log.add_evidence(tracked, map,
-                   landmarks_on_objects(map, tracked, camera, result.dynamic_objects.mask, frame.depth));
+  log.add_evidence(landmarks_on_objects(map, tracked, camera, result.dynamic_objects.mask, frame.depth));
   front_end.remember(tracked, map, observation, keyframe.is_valid());
   if (tracked.reference.is_valid()) result.submap = map.submap_of(tracked.reference);
   cull_contradicted(tracked, frame, result.dynamic_objects);

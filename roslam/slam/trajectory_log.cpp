@@ -20,6 +20,7 @@ std::set<SubmapId> loaded_submaps(const Map& map) {
 void TrajectoryLog::add(const TrackedFrame& frame, std::size_t index, const Map& map) {
   ++by_state_[frame.state];
   Record record{index, frame.timestamp, {}, {}};
+  record.is_measured = frame.state == TrackingState::kTracking;
   if (frame.T_camera_world && frame.reference.is_valid()) {
     record.reference = frame.reference;
     record.T_camera_reference = *frame.T_camera_world * map.T_camera_world(frame.reference).inverse();
@@ -27,20 +28,29 @@ void TrajectoryLog::add(const TrackedFrame& frame, std::size_t index, const Map&
   records_.push_back(record);
 }
 
-void TrajectoryLog::add_evidence(const TrackedFrame& frame, const Map& map,
-                                 const LandmarksInView& landmarks) {
-  if (!frame.reference.is_valid() || frame.state != TrackingState::kTracking) return;
-  Evidence& evidence = evidence_[map.submap_of(frame.reference)];
-  ++evidence.frames;
-  if (landmarks.all > 0) evidence.share += static_cast<double>(landmarks.on_objects) / landmarks.all;
+void TrajectoryLog::add_evidence(const LandmarksInView& landmarks) {
+  if (landmarks.all > 0)
+    records_.back().share_on_objects =
+        static_cast<float>(landmarks.on_objects) / static_cast<float>(landmarks.all);
 }
 
 std::set<SubmapId> TrajectoryLog::submaps_on_objects(const Map& map) const {
   constexpr int kFewest = 5;  // frames
   constexpr double kMost = 0.5;
+  struct Evidence {
+    int frames = 0;
+    double share = 0.0;  // sum over the frames
+  };
+  std::map<SubmapId, Evidence> evidence;
+  for (const auto& record : records_) {
+    if (!record.reference.is_valid() || !record.is_measured) continue;
+    Evidence& of_submap = evidence[map.submap_of(record.reference)];
+    ++of_submap.frames;
+    of_submap.share += static_cast<double>(record.share_on_objects);
+  }
   std::set<SubmapId> found;
-  for (const auto& [submap, evidence] : evidence_) {
-    if (evidence.frames >= kFewest && evidence.share > kMost * evidence.frames) found.insert(submap);
+  for (const auto& [submap, e] : evidence) {
+    if (e.frames >= kFewest && e.share > kMost * e.frames) found.insert(submap);
   }
   found.erase(main_submap(map));
   return found;

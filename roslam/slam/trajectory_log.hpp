@@ -22,8 +22,8 @@ class TrajectoryLog {
  public:
   /// index: of the frame in its source.
   void add(const TrackedFrame& frame, std::size_t index, const Map& map);
-  /// landmarks: of the frame's submap that were seen, and those of them that are on dynamic objects.
-  void add_evidence(const TrackedFrame& frame, const Map& map, const LandmarksInView& landmarks);
+  /// Of the frame last added: landmarks that were in view, and those of them that are on dynamic objects.
+  void add_evidence(const LandmarksInView& landmarks);
 
   /// Submaps, other than the main one, whose landmarks turned out to be on dynamic objects in most cases.
   std::set<SubmapId> submaps_on_objects(const Map& map) const;
@@ -59,14 +59,10 @@ class TrajectoryLog {
     double timestamp;      // seconds
     KeyframeId reference;  // invalid: not tracked
     SE3 T_camera_reference;
+    float share_on_objects = 0.0F;  // of the landmarks in view
+    bool is_measured = false;       // not predicted
   };
 
-  struct Evidence {
-    int frames = 0;
-    double share = 0.0;  // of landmarks on dynamic objects, sum over the frames
-  };
-
-  std::map<SubmapId, Evidence> evidence_;
   std::vector<Record> records_;
   std::map<TrackingState, std::size_t> by_state_;
   std::map<RejectReason, std::size_t> rejected_;

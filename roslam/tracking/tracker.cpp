@@ -93,6 +93,7 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   if (found) {
     state_ = TrackingState::kTracking;
     frames_lost_ = frames_unrecognised_ = 0;
+    waits_since_.reset();
     relocaliser_.restart();
     frame.quality = std::min(1.0, frame.inliers / static_cast<double>(settings_.tracker.trusted_inliers));
     count_found(frame);
@@ -140,6 +141,7 @@ TrackedFrame Tracker::initialise(TrackedFrame frame) {
   frames_lost_ = frames_unrecognised_ = 0;
   relocaliser_.restart();
   velocity_.reset();
+  waits_since_.reset();
   last_ = frame;
   return frame;
 }

@@ -94,10 +94,6 @@ BenchmarkRun run_sequence(const BenchmarkSequence& sequence, const BenchmarkSett
                           const fs::path& out, const std::string& folder, const std::stop_token& stop) {
   BenchmarkRun run;
   run.folder = folder;
-  std::error_code error;
-  // Files of an earlier benchmark must not be taken for those of this run.
-  for (const char* name : {"run.json", "trajectory.txt", "groundtruth.txt"})
-    fs::remove(out / folder / name, error);
   make_folder(out / folder);
   const auto result =
       run_this_program(run_arguments(sequence, settings, out / folder), out / folder / "stderr.txt", stop);

@@ -11,6 +11,7 @@
 #include "apps/roslam/evaluate/evaluate.hpp"
 #include "apps/roslam/support/named_path.hpp"
 #include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/replaces_only.hpp"
 #include "evaluation/trajectory_error.hpp"
 #include "evaluation/trajectory_plot.hpp"
 #include "evaluation/trajectory_report.hpp"
@@ -139,7 +140,8 @@ void add_evaluate_trajectory_command(CLI::App& evaluate) {
                    "Trajectories of other systems, also as NAME=FILE; not part of the median")
       ->type_name("FILE");
   command->add_option("--plot", arguments->plot, "Draw the trajectories and their errors to this PNG file")
-      ->type_name("FILE.png");
+      ->type_name("FILE.png")
+      ->check(replaces_only_images());
   command->add_flag("--json", arguments->json, "Print one JSON object on stdout instead of tables");
   command->add_flag("--scale", arguments->scale, "Align with scale, Sim(3), for monocular estimates");
   auto& association = arguments->options.association;

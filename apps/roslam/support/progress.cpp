@@ -22,6 +22,10 @@ Progress::~Progress() {
   if (shown_ && is_terminal_) std::fputs("\n", stderr);
 }
 
+void Progress::print(const std::string& line) {
+  std::fprintf(stderr, "%s%s\n", shown_ && is_terminal_ ? "\n" : "", line.c_str());
+}
+
 void Progress::show(std::size_t done, std::string_view state) {
   const auto now = Clock::now();
   const bool is_last = total_ && done >= *total_;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace roslam::app {
@@ -16,6 +17,9 @@ class Progress {
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
+
+  /// Prints a line beside the progress, such as a warning; also if quiet.
+  void print(const std::string& line);
 
   /// done: steps so far. state: one or two words, such as the tracking state.
   void show(std::size_t done, std::string_view state);

@@ -57,7 +57,8 @@ RestoredFolder::RestoredFolder(fs::path folder, const Camera& camera)
 void RestoredFolder::require_usable(const fs::path& folder) {
   std::error_code error;
   if (fs::exists(folder / kReport, error)) return;
-  for (const char* name : {"rgb.txt", "rgb", "depth", kProvenance, "run.json"}) {
+  for (const char* name :
+       {"rgb.txt", "rgb", "depth.txt", "depth", "camera.yaml", "before_after.jpg", kProvenance, "run.json"}) {
     if (fs::exists(folder / name, error))
       throw OutputError(folder.string() +
                         ": holds a dataset or a run, which the result could replace; choose another --out");
