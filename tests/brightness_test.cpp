@@ -39,6 +39,17 @@ TEST(Brightness, DarkImagesGetCornersAndAreCounted) {
   EXPECT_LT(before, after / 2) << "the control: the image was dark enough to lose corners";
 }
 
+TEST(Brightness, WarnsOfAFaultThatLasts) {
+  BrightnessNormaliser normaliser;
+  for (int i = 0; i < 9; ++i) normaliser.update(scene(0, 9));
+  EXPECT_TRUE(normaliser.warnings().empty());
+  normaliser.update(scene(0, 9));
+  ASSERT_EQ(normaliser.warnings().size(), 1u);
+  EXPECT_NE(normaliser.warnings().begin()->first.find("dark"), std::string::npos);
+  for (int i = 0; i < 45; ++i) normaliser.update(scene(20, 230));
+  EXPECT_TRUE(normaliser.warnings().empty()) << "a dark moment of a long flight";
+}
+
 TEST(Brightness, ImagesOfLittleContrastKeepTheirOffset) {
   BrightnessNormaliser normaliser;
   const cv::Mat hazy = scene(150, 170);

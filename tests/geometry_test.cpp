@@ -149,6 +149,15 @@ TEST_F(CameraFile, RefusesDistortionThatCouldMeanTwoThings) {
   EXPECT_EQ(read(good_ + "distortion: []\n").distortion, (std::array<double, 5>{}));
 }
 
+TEST_F(CameraFile, TellsACalibrationOfAnotherSize) {
+  for (const auto& name : camera_preset_names())
+    EXPECT_TRUE(camera_preset(name)->has_central_principal_point()) << name;
+  Camera camera = read(good_);
+  camera.width = 1280;
+  camera.height = 960;
+  EXPECT_FALSE(camera.has_central_principal_point());
+}
+
 TEST_F(CameraFile, RejectsWhatItDoesNotKnow) {
   EXPECT_THROW(read(good_ + "focal: 3\n"), InputError);
   EXPECT_THROW(read(good_ + "fps: fast\n"), InputError);

@@ -68,4 +68,14 @@ cv::Mat BrightnessNormaliser::apply(const cv::Mat& image) const {
   return stretched;
 }
 
+std::map<std::string, std::size_t> BrightnessNormaliser::warnings() const {
+  constexpr std::size_t kSeveral = 10;  // frames
+  constexpr std::size_t kShare = 5;     // every fifth of all
+  const auto are_many = [&](std::size_t frames) { return frames >= kSeveral && kShare * frames >= frames_; };
+  std::map<std::string, std::size_t> warnings;
+  if (are_many(dark_)) warnings["the images are dark; expose longer or add light"] = dark_;
+  if (are_many(flat_)) warnings["the images have little contrast; check the lens and the exposure"] = flat_;
+  return warnings;
+}
+
 }  // namespace roslam

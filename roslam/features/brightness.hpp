@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <opencv2/core.hpp>
+#include <string>
 
 namespace roslam {
 
@@ -20,7 +22,9 @@ class BrightnessNormaliser {
   /// The image (CV_8UC1 or CV_8UC3) of the frame with its contrast stretched; itself if not is_on().
   cv::Mat apply(const cv::Mat& image) const;
 
-  std::size_t frames() const { return frames_; }  ///< so far
+  /// What is wrong with the exposure, in words with the remedy, and in how many frames; of a fault that at
+  /// least every fifth frame has.
+  std::map<std::string, std::size_t> warnings() const;
 
   /// Frames so far that were dark, and those of little contrast that were not.
   std::size_t dark() const { return dark_; }

@@ -66,6 +66,11 @@ bool Camera::has_distortion() const {
   return std::any_of(distortion.begin(), distortion.end(), [](double k) { return k != 0.0; });
 }
 
+bool Camera::has_central_principal_point() const {
+  constexpr double kOffCentre = 0.15;  // of the image's size
+  return std::abs(cx / width - 0.5) <= kOffCentre && std::abs(cy / height - 0.5) <= kOffCentre;
+}
+
 Eigen::Vector2d Camera::distort(const Eigen::Vector2d& pixel) const {
   const auto& [k1, k2, p1, p2, k3] = distortion;
   const double x = (pixel.x() - cx) / fx;

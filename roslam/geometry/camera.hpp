@@ -32,6 +32,10 @@ struct ROSLAM_EXPORT Camera {
 
   bool has_distortion() const;
 
+  /// False if the principal point is so far from the image centre that the calibration may be that of another
+  /// size.
+  bool has_central_principal_point() const;
+
   /// Pinhole projection of a point in the camera frame (z > 0) to an undistorted pixel.
   Eigen::Vector2d project(const Eigen::Vector3d& point) const {
     return {fx * point.x() / point.z() + cx, fy * point.y() / point.z() + cy};

@@ -2,7 +2,6 @@
 #include "roslam/slam/front_end.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -154,21 +153,9 @@ std::map<std::string, std::size_t> FrontEnd::faults() const {
 }
 
 std::map<std::string, std::size_t> FrontEnd::warnings() const {
-  const auto are_many = [&](std::size_t frames) {
-    constexpr std::size_t kSeveral = 10;
-    constexpr std::size_t kShare = 5;  // every fifth of all
-    return frames >= kSeveral && kShare * frames >= brightness_.frames();
-  };
-  std::map<std::string, std::size_t> warnings;
-  if (are_many(brightness_.dark()))
-    warnings["the images are dark; expose longer or add light"] = brightness_.dark();
-  if (are_many(brightness_.flat()))
-    warnings["the images have little contrast; check the lens and the exposure"] = brightness_.flat();
+  auto warnings = brightness_.warnings();
   for (const std::string& alarm : depth_check_.alarms()) warnings[alarm] = 1;
-  constexpr double kOffCentre =
-      0.15;  // of the image's size; more is a crop, or the calibration of another size
-  if (std::abs(camera_.cx / camera_.width - 0.5) > kOffCentre ||
-      std::abs(camera_.cy / camera_.height - 0.5) > kOffCentre)
+  if (!camera_.has_central_principal_point())
     warnings["the principal point is far from the image centre; is the calibration of another image size?"] =
         1;
   return warnings;
