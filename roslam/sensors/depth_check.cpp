@@ -13,9 +13,10 @@ namespace roslam {
 
 namespace {
 constexpr double kInterval = 0.09;    // seconds between samples
-constexpr std::size_t kHistory = 11;  // samples, a second
+constexpr std::size_t kHistory = 8;   // samples, 0.7 s
 constexpr std::size_t kLeastLag = 2;  // samples; less may be the delay of a real sensor
 constexpr std::size_t kWindow = 30;   // samples that are judged together
+constexpr std::size_t kSurely = 24;   // samples after which none of the alternatives is expected to fit
 constexpr std::size_t kFrames = 90;   // the window of tracking
 constexpr std::size_t kLeastSamples = 12;
 constexpr std::size_t kFlips = 3;
@@ -187,7 +188,7 @@ void DepthCheck::check_scale(const cv::Mat& small, const cv::Mat& depth) {
   constexpr double kNear = 0.6;         // metres; 95 % of a depth image within it,
   constexpr double kMedianNear = 0.25;  // or half of it within this, is nearer than depth sensors measure
   constexpr double kFar = 15.0;         // metres; of farther scenes stereo of any baseline may be right
-  constexpr std::size_t kEvery = 5;     // samples
+  constexpr std::size_t kEvery = 2;     // samples
   std::vector<float> known = known_depths(small);
   if (known.size() < small.total() / 10) return;
   push(near_, percentile(known, 0.95), kWindow);
@@ -233,7 +234,7 @@ std::optional<DepthCheck::Verdict> DepthCheck::compare(const Sample& sample) con
 DepthCheck::Alternative DepthCheck::best_alternative() const {
   constexpr double kAdvantage = 0.07;
   constexpr double kCertainty = 5.0;  // mean over its standard error
-  constexpr double kFits = 0.65;
+  constexpr double kFits = 0.63;
   Alternative best;
   for (std::size_t i = 0; i < verdicts_.back().advantages.size(); ++i) {
     double sum = 0.0;
@@ -272,11 +273,12 @@ void DepthCheck::judge() {
                            ? "the depth images lag behind the colour images by about %.1f s"
                            : "the depth images are ahead of the colour images by about %.1f s";
     raise(text_of(kind, seconds), is_misfit_);
-  } else if (verdicts_.size() == kWindow) {
+  } else if (verdicts_.size() >= kSurely) {
     constexpr double kUnrelated = 0.6;
     constexpr double kTrouble = 0.25;  // share of frames lost or made keyframes
     double registered = 0.0;
-    for (const auto& verdict : verdicts_) registered += verdict.registered / static_cast<double>(kWindow);
+    for (const auto& verdict : verdicts_) registered += verdict.registered;
+    registered /= static_cast<double>(verdicts_.size());
     const auto troubles = static_cast<double>(std::count(troubles_.begin(), troubles_.end(), true));
     if (registered < kUnrelated && troubles >= kTrouble * static_cast<double>(troubles_.size()))
       raise("the depth images do not belong to the colour images: their edges do not coincide", is_misfit_);

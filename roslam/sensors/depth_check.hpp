@@ -17,7 +17,7 @@ namespace roslam {
 /// than the depth edges have is about 0.75 for registered images and 0.5 for unrelated ones. Where depth that
 /// is mirrored, turned, or of another time fits better than the one given, that is the fault; where none fits
 /// and tracking fails, the images do not belong together. A wrong scale shows in depth that no sensor
-/// measures. Ten images a second are looked at. Not thread safe.
+/// measures. Ten images a second are looked at, while the view changes. Not thread safe.
 class DepthCheck {
  public:
   /// fx: of the camera, pixels.
