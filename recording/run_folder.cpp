@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <ctime>
@@ -10,6 +11,8 @@
 #include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "evaluation/trajectory_plot.hpp"
@@ -74,18 +77,28 @@ bool is_same(const Path& a, const Path& b) {
   return !b.empty() && std::filesystem::equivalent(a, b, error);
 }
 
+// Devices and what else is no file stays where it is.
+bool is_file_or_folder(const Path& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  return std::filesystem::is_regular_file(status) || std::filesystem::is_directory(status);
+}
+
 // Moves the results of an earlier run to previous/, as a whole: what is there is of the run before and goes.
-// An earlier run that was killed before it wrote a trajectory leaves nothing worth that.
+// An earlier run that was killed before it wrote any leaves nothing worth that.
 void move_away(const Path& folder, const Path& kept) {
   std::error_code error;
   const Path previous = folder / kPrevious;
-  const bool has_results = std::filesystem::exists(folder / "trajectory.txt", error);
+  const std::set<std::string> unfinished{"run.json", "descriptors.jsonl", "masks"};  // written during a run
+  const bool has_results = std::any_of(kResults.begin(), kResults.end(), [&](const char* name) {
+    return unfinished.count(name) == 0 && is_file_or_folder(folder / name);
+  });
   if (has_results) make_folder(previous);
   for (const char* name : kResults) {
     if (is_same(folder / name, kept)) continue;
     if (has_results) std::filesystem::remove_all(previous / name, error);
     error.clear();
-    if (!std::filesystem::exists(folder / name, error)) continue;
+    if (!is_file_or_folder(folder / name)) continue;
     if (has_results) {
       std::filesystem::rename(folder / name, previous / name, error);
     } else {
@@ -126,7 +139,7 @@ RunFolder::RunFolder(const std::filesystem::path& path, bool overwrite) : path_(
                       ": is a dataset, whose ground truth the results could overwrite; choose another --out");
   }
   for (const char* name : kResults) {
-    if (overwrite || is_run(path) || !std::filesystem::exists(path / name, error)) continue;
+    if (overwrite || is_run(path) || !is_file_or_folder(path / name)) continue;
     throw OutputError(
         path.string() + ": holds " + name +
         ", which roslam run did not write; choose another --out, or replace it with --overwrite");

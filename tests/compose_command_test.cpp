@@ -228,7 +228,7 @@ TEST_F(ComposeCommand, TellsWhenTheDiskIsFull) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
   fs::create_directories(folder_ / "out/rgb");
   fs::create_symlink("/dev/full", folder_ / "out/rgb/10.000000.png");
-  fails(compose_base("--out out"), "10.000000.png: cannot be written in full");
+  fails(compose_base("--out out --overwrite"), "10.000000.png: cannot be written in full");
 }
 
 TEST_F(ComposeCommand, ListsOfACompositionThatFailsAreAbsent) {

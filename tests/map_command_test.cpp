@@ -128,7 +128,7 @@ TEST_F(MapCommand, ARunFolderStandsForItsMap) {
   fly("further", 20, 50, "--map " + quoted(first));
   for (const std::string& arguments :
        {"info " + quoted(localised), "export --keyframes " + out + quoted(localised),
-        "merge --quiet --out " + out + quoted(first) + quoted(localised)})
+        "merge --quiet --out " + quoted(kept_ / "merged") + quoted(first) + quoted(localised)})
     expect_refused(map(arguments),
                    {localised.string() + ": the folder holds no map.roslam", "--localise-only"});
   expect_refused(run("--dynamic none --map " + quoted(localised)), {"holds no map.roslam"});
@@ -208,8 +208,9 @@ TEST_F(MapCommand, AFullDiskCostsNoMap) {
   fs::create_directories(run_);
   put(run_ / "map.roslam", bytes);
   fs::create_symlink("/dev/full", run_ / "map.roslam.part");
-  expect_refused(run("--dynamic none"), {(run_ / "map.roslam").string(), "cannot be written in full"});
-  EXPECT_EQ(content(run_ / "map.roslam"), bytes);
+  expect_refused(run("--dynamic none --overwrite"),
+                 {(run_ / "map.roslam").string(), "cannot be written in full"});
+  EXPECT_EQ(content(run_ / "previous/map.roslam"), bytes);
   EXPECT_FALSE(fs::exists(fs::symlink_status(run_ / "map.roslam.part")));
   EXPECT_GT(fs::file_size(run_ / "trajectory.txt"), 100U);
 }

@@ -163,9 +163,14 @@ TEST_F(Output, StandardOutputThatIsFullIsReported) {
 
 TEST_F(Output, ResultsOfAnEarlierRunDoNotStay) {
   fs::create_directories(run_);
-  put(run_ / "groundtruth.txt", "of another flight\n");
+  put(run_ / "groundtruth.txt", "of somebody else\n");
+  expect_refused(run(), {"groundtruth.txt", "--overwrite"});
+  fs::remove_all(run_);
+  EXPECT_EQ(run().code, 0);
+  put(run_ / "groundtruth.txt", "of the earlier run\n");
   EXPECT_EQ(run().code, 0);
   EXPECT_FALSE(fs::exists(run_ / "groundtruth.txt"));
+  EXPECT_EQ(content(run_ / "previous/groundtruth.txt"), "of the earlier run\n");
   EXPECT_TRUE(fs::exists(run_ / "trajectory.png"));
   fs::remove_all(data_ / "depth");
   EXPECT_EQ(run().code, 1);
@@ -201,8 +206,9 @@ class Interrupt : public Dataset, public testing::WithParamInterface<const char*
     program_end_ = open(ptsname(terminal_), O_RDWR | O_NOCTTY | O_CLOEXEC);
     ASSERT_GE(program_end_, 0);
     process_ = start(program_end_);
-    char first = 0;
-    ASSERT_EQ(read(terminal_, &first, 1), 1);  // progress is shown once a frame is tracked
+    std::string progress;
+    for (char byte = 0; progress.find("tracking") == std::string::npos; progress += byte)
+      ASSERT_EQ(read(terminal_, &byte, 1), 1) << progress;
   }
 
   void TearDown() override {

@@ -45,11 +45,14 @@ FrontEndResult FrontEnd::observe(const Frame& frame, const cv::Mat& mask,
 }
 
 // Whether movable objects fill the image, also where the labels of all of it were not used.
-bool FrontEnd::fills_image(const Frame& frame, const FrontEndResult& observation) const {
+bool FrontEnd::fills_image(const Frame& frame, const FrontEndResult& observation) {
   if (observation.hidden_share >= options_.tracker.hidden_share &&
       observation.removed_points.size() > observation.points.size())
     return true;
+  constexpr double kLongestWait = 0.5;  // seconds for the first labels, in real time
+  if (!first_timestamp_) first_timestamp_ = frame.timestamp;
   const bool awaits_labels = mode_ == Mode::kRealTime && segmentation_.is_on() &&
+                             frame.timestamp - *first_timestamp_ < kLongestWait &&
                              observation.dynamic_objects.label_age < 0 && faults().empty();
   if (awaits_labels) return true;
   if (!observation.dynamic_objects.is_everything_labelled || frame.depth.empty()) return false;

@@ -82,7 +82,7 @@ class FrontEnd {
  private:
   DynamicObjects detect(const Frame& frame, const cv::Mat& grey,
                         const std::optional<SE3>& predicted_T_camera_world, std::size_t frame_count);
-  bool fills_image(const Frame& frame, const FrontEndResult& observation) const;
+  bool fills_image(const Frame& frame, const FrontEndResult& observation);
   void check_input(const Frame& frame, const cv::Mat& grey, FrontEndResult& observation);
   void extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& mask, std::size_t frame_count,
                FrontEndResult& observation);
@@ -99,6 +99,7 @@ class FrontEnd {
   cv::Mat labels_;
   std::size_t labelled_index_ = 0;
   int last_inliers_ = 0;
+  std::optional<double> first_timestamp_;  // seconds
   // The last frame whose pose was measured: pose in the map as it was by then, and how often it was corrected
   // by then.
   std::optional<SE3> measured_T_camera_world_;
