@@ -6,15 +6,16 @@
 #include <system_error>
 
 #include "roslam/common/error.hpp"
+#include "roslam/common/export.hpp"
 
 namespace roslam {
 
 /// Writes a file in whole or not at all: writes a temporary file (.part) and renames it, so that the old
 /// content stays until the new is complete. A device or pipe is written directly. Throws OutputError.
-void write_file(const std::filesystem::path& file, std::string_view bytes);
+ROSLAM_EXPORT void write_file(const std::filesystem::path& file, std::string_view bytes);
 
 /// The same, but flushes to the disk before renaming, so that a power cut costs neither the old nor the new.
-void replace_file(const std::filesystem::path& file, std::string_view bytes);
+ROSLAM_EXPORT void replace_file(const std::filesystem::path& file, std::string_view bytes);
 
 /// Creates a folder and its missing parents. Throws OutputError if that fails.
 inline void make_folder(const std::filesystem::path& folder) {
