@@ -18,11 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 constexpr const char* kMark = ".roslam";  // a line "COMMAND NAME" for each file or folder written
 
-const fs::path& created(const fs::path& folder) {
-  make_folder(folder);
-  return folder;
-}
-
 std::set<std::string> read_marks(const fs::path& folder) {
   std::set<std::string> marks;
   std::ifstream in(folder / kMark);
@@ -31,8 +26,15 @@ std::set<std::string> read_marks(const fs::path& folder) {
 }
 }  // namespace
 
-FolderLock::FolderLock(const fs::path& folder)
-    : descriptor_(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+bool is_file_or_folder(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  return fs::is_regular_file(status) || fs::is_directory(status);
+}
+
+FolderLock::FolderLock(const fs::path& folder) {
+  make_folder(folder);
+  descriptor_ = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor_ < 0 || flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
   close(descriptor_);
   throw OutputError(folder.string() +
@@ -45,7 +47,7 @@ FolderLock::~FolderLock() {
 
 OutputFolder::OutputFolder(const fs::path& path, const std::string& command,
                            const std::vector<std::string>& names, bool overwrite)
-    : path_(created(path)), command_(command), lock_(path), overwrites_(overwrite), marks_(read_marks(path)) {
+    : path_(path), command_(command), lock_(path), overwrites_(overwrite), marks_(read_marks(path)) {
   for (const auto& name : names) require_free(name);
   for (const auto& name : names) {
     claim(name);
@@ -58,9 +60,7 @@ OutputFolder::OutputFolder(const fs::path& path, const std::string& command,
 }
 
 void OutputFolder::require_free(const std::string& name) const {
-  std::error_code error;
-  const fs::file_status there = fs::status(path_ / name, error);
-  if (!fs::is_regular_file(there) && !fs::is_directory(there)) return;
+  if (!is_file_or_folder(path_ / name)) return;
   if (overwrites_ || marks_.count(command_ + " " + name) > 0) return;
   throw OutputError(path_.string() + ": holds " + name + ", which roslam " + command_ +
                     " did not write; choose another --out, or replace it with --overwrite");

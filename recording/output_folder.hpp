@@ -8,11 +8,12 @@
 
 namespace roslam::recording {
 
-/// Exclusive use of an existing folder among processes of this program, until it is destroyed or the process
-/// ends, however it ends.
+/// Exclusive use of a folder among processes of this program, until it is destroyed or the process ends,
+/// however it ends.
 class FolderLock {
  public:
-  /// Throws OutputError if another process holds it. On file systems without locks it holds nothing.
+  /// Creates the folder if it does not exist. Throws OutputError if that fails or if another process holds
+  /// it. On file systems without locks it holds nothing.
   explicit FolderLock(const std::filesystem::path& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;
@@ -21,6 +22,9 @@ class FolderLock {
  private:
   int descriptor_ = -1;
 };
+
+/// False for a device, a pipe and what does not exist.
+bool is_file_or_folder(const std::filesystem::path& path);
 
 /// The folder that a command writes to. Files that the same command wrote before may be replaced; those of
 /// anybody else are not touched, unless the user asked for it.
@@ -32,8 +36,6 @@ class OutputFolder {
   /// and overwrite is false.
   OutputFolder(const std::filesystem::path& path, const std::string& command,
                const std::vector<std::string>& names, bool overwrite);
-
-  const std::filesystem::path& path() const { return path_; }
 
   /// Claims a further file or folder. Throws OutputError unless it does not exist, is the command's own, or
   /// overwrite.

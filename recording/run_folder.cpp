@@ -50,11 +50,6 @@ constexpr std::array kResults{"run.json",        "trajectory.txt", "keyframes.tx
                               "removal.jpg",     "removal.avi",    "restoration.jpg"};
 constexpr const char* kPrevious = "previous";
 
-const Path& created(const Path& folder) {
-  make_folder(folder);
-  return folder;
-}
-
 bool is_run(const Path& folder) {
   const auto json = nlohmann::json::parse(std::ifstream(folder / "run.json"), nullptr, false);
   return json.is_object() && json.contains("version") && json.contains("source");
@@ -77,15 +72,8 @@ bool is_same(const Path& a, const Path& b) {
   return !b.empty() && std::filesystem::equivalent(a, b, error);
 }
 
-// Devices and what else is no file stays where it is.
-bool is_file_or_folder(const Path& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  return std::filesystem::is_regular_file(status) || std::filesystem::is_directory(status);
-}
-
 // Moves the results of an earlier run to previous/, as a whole: what is there is of the run before and goes.
-// An earlier run that was killed before it wrote any leaves nothing worth that.
+// An earlier run that was killed before it wrote any leaves nothing worth that. A device stays where it is.
 void move_away(const Path& folder, const Path& kept) {
   std::error_code error;
   const Path previous = folder / kPrevious;
@@ -132,14 +120,15 @@ void RunFolder::write_one(const Output& output, const std::filesystem::path& fil
   }
 }
 
-RunFolder::RunFolder(const std::filesystem::path& path, bool overwrite) : path_(created(path)), lock_(path) {
+RunFolder::RunFolder(const std::filesystem::path& path, bool overwrite) : path_(path), lock_(path) {
   std::error_code error;
   if (std::filesystem::exists(path / "rgb.txt", error)) {
     throw OutputError(path.string() +
                       ": is a dataset, whose ground truth the results could overwrite; choose another --out");
   }
+  const bool may_replace = overwrite || is_run(path);
   for (const char* name : kResults) {
-    if (overwrite || is_run(path) || !is_file_or_folder(path / name)) continue;
+    if (may_replace || !is_file_or_folder(path / name)) continue;
     throw OutputError(
         path.string() + ": holds " + name +
         ", which roslam run did not write; choose another --out, or replace it with --overwrite");
@@ -158,16 +147,7 @@ void RunFolder::begin(RunDescription& description, const Camera& camera) const {
   }
   move_away(path_, description.map);
   description.id = new_id();
-  nlohmann::ordered_json json;
-  json["run"] = description.id;
-  json["finished"] = false;
-  json["version"] = description.version;
-  json["source"] = description.source;
-  if (!description.flight.empty()) json["flight"] = description.flight;
-  json["camera"] = nlohmann::ordered_json::parse(camera_to_json(camera));
-  json["camera"]["name"] = description.camera;
-  write_file(path_ / "run.json",
-             json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  write_file(path_ / "run.json", unfinished_report(description, camera));
 }
 
 std::map<std::string, std::size_t> rejected_by_reason(const Slam& slam) {

@@ -100,6 +100,9 @@ FrameCounts count_frames(const Slam& slam, const RunResults& summary, const Fram
 /// Frames that the pipeline did not use, by reason in words.
 std::map<std::string, std::size_t> rejected_by_reason(const Slam& slam);
 
+/// The contents of run.json of a run that has begun: what it is, and that it is not finished.
+std::string unfinished_report(const RunDescription& description, const Camera& camera);
+
 /// The contents of run.json.
 std::string run_report(const Slam& slam, const RunResults& summary, const FrameSource& source,
                        const RunDescription& description);
@@ -107,8 +110,5 @@ std::string run_report(const Slam& slam, const RunResults& summary, const FrameS
 /// The contents of report.html. folder: of the run's images.
 std::string run_page(const Slam& slam, const RunResults& summary, const FrameSource& source,
                      const RunDescription& description, const std::filesystem::path& folder);
-
-/// camera as in run.json.
-std::string camera_to_json(const Camera& camera);
 
 }  // namespace roslam::recording

@@ -21,7 +21,22 @@ double rounded(double value, int decimals) {
   return std::round(value * factor) / factor;
 }
 
-Json camera_json(const Camera& camera) {
+// The beginning of run.json: what runs.
+Json head_json(const RunDescription& description, bool is_finished) {
+  Json json{{"run", description.id},
+            {"finished", is_finished},
+            {"version", description.version},
+            {"source", description.source}};
+  if (!description.flight.empty()) json["flight"] = description.flight;
+  return json;
+}
+
+// Bytes of file names that are not valid UTF-8 are replaced rather than refused.
+std::string text_of(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Json camera_json(const Camera& camera, const RunDescription& description) {
   return {{"width", camera.width},
           {"height", camera.height},
           {"fx", camera.fx},
@@ -30,7 +45,8 @@ Json camera_json(const Camera& camera) {
           {"cy", camera.cy},
           {"distortion", camera.distortion},
           {"depth_units_per_metre", camera.depth_units_per_metre},
-          {"fps", camera.fps}};
+          {"fps", camera.fps},
+          {"name", description.camera}};
 }
 
 Json counts_json(const std::map<std::string, std::size_t>& counts) {
@@ -160,8 +176,6 @@ double path_length(const Trajectory& trajectory) {
 }
 }  // namespace
 
-std::string camera_to_json(const Camera& camera) { return camera_json(camera).dump(); }
-
 std::size_t FrameCounts::all_skipped() const {
   return std::accumulate(skipped.begin(), skipped.end(), std::size_t{0},
                          [](std::size_t sum, const auto& entry) { return sum + entry.second; });
@@ -200,16 +214,17 @@ FrameCounts count_frames(const Slam& slam, const RunResults& summary, const Fram
   return counts;
 }
 
+std::string unfinished_report(const RunDescription& description, const Camera& camera) {
+  Json json = head_json(description, false);
+  json["camera"] = camera_json(camera, description);
+  return text_of(json);
+}
+
 std::string run_report(const Slam& slam, const RunResults& summary, const FrameSource& source,
                        const RunDescription& description) {
   const double per_second =
       summary.wall_seconds > 0.0 ? static_cast<double>(slam.frames()) / summary.wall_seconds : 0.0;
-  Json json;
-  json["run"] = description.id;
-  json["finished"] = true;
-  json["version"] = description.version;
-  json["source"] = description.source;
-  if (!description.flight.empty()) json["flight"] = description.flight;
+  Json json = head_json(description, true);
   json["mode"] = slam.mode() == Mode::kDeterministic ? "deterministic" : "real-time";
   json["interrupted"] = summary.interrupted;
   json["error"] = summary.failure ? Json(message_of(summary.failure)) : Json(nullptr);
@@ -231,11 +246,9 @@ std::string run_report(const Slam& slam, const RunResults& summary, const FrameS
   json["start_up_seconds"] = rounded(summary.start_up_seconds, 2);
   json["peak_memory_megabytes"] = rounded(static_cast<double>(peak_memory()) / 1048576.0, 1);
   json["processor_milliseconds"] = times_json(slam.times());
-  json["camera"] = camera_json(slam.camera());
-  json["camera"]["name"] = description.camera;
+  json["camera"] = camera_json(slam.camera(), description);
   json["options"] = Json::parse(options_to_json(slam.options()));
-  // Bytes of file names that are not valid UTF-8 are replaced rather than refused.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return text_of(json);
 }
 
 }  // namespace roslam::recording

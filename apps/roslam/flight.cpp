@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "apps/roslam/flight.hpp"
 
-#include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <iostream>

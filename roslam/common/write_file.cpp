@@ -29,9 +29,8 @@ void write_bytes(const fs::path& to, std::string_view bytes, bool is_flushed, co
 }
 
 void write(const fs::path& file, std::string_view bytes, bool is_flushed) {
+  if (is_device(file)) return write_bytes(file, bytes, false, file);
   std::error_code error;
-  const fs::file_status old = fs::status(file, error);
-  if (fs::exists(old) && !fs::is_regular_file(old)) return write_bytes(file, bytes, false, file);
   const fs::path target = fs::is_symlink(file, error) ? fs::weakly_canonical(file, error) : file;
   const fs::path part = fs::path(target) += ".part";
   try {
@@ -46,6 +45,12 @@ void write(const fs::path& file, std::string_view bytes, bool is_flushed) {
   }
 }
 }  // namespace
+
+bool is_device(const fs::path& file) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  return fs::exists(status) && !fs::is_regular_file(status);
+}
 
 void write_file(const fs::path& file, std::string_view bytes) { write(file, bytes, false); }
 void replace_file(const fs::path& file, std::string_view bytes) { write(file, bytes, true); }

@@ -10,6 +10,9 @@
 
 namespace roslam {
 
+/// True for what is written directly, as it cannot be replaced: a device or a pipe.
+ROSLAM_EXPORT bool is_device(const std::filesystem::path& file);
+
 /// Writes a file in whole or not at all: writes a temporary file (.part) and renames it, so that the old
 /// content stays until the new is complete. A device or pipe is written directly. Throws OutputError.
 ROSLAM_EXPORT void write_file(const std::filesystem::path& file, std::string_view bytes);

@@ -19,6 +19,7 @@ constexpr std::size_t kWindow = 30;   // samples that are judged together
 constexpr std::size_t kSurely = 24;   // samples after which none of the alternatives is expected to fit
 constexpr std::size_t kFrames = 90;   // the window of tracking
 constexpr std::size_t kLeastSamples = 12;
+constexpr double kFewestKnown = 0.1;  // share of the image whose depth must be known
 constexpr std::size_t kFlips = 3;
 constexpr std::array<const char*, kFlips> kFlipNames{"mirrored left to right", "mirrored upside down",
                                                      "turned by 180 degrees"};
@@ -93,23 +94,6 @@ double mean_rank(const cv::Mat& rank, const std::vector<cv::Point>& edges, bool 
   return sum / (255.0 * static_cast<double>(edges.size()));
 }
 
-std::vector<float> known_depths(const cv::Mat& depth) {
-  std::vector<float> known;
-  for (int y = 0; y < depth.rows; ++y) {
-    for (int x = 0; x < depth.cols; ++x) {
-      if (is_known(depth.at<float>(y, x))) known.push_back(depth.at<float>(y, x));
-    }
-  }
-  return known;
-}
-
-double percentile(std::vector<float>& values, double share) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 template <typename Value>
 void push(std::deque<Value>& values, Value value, std::size_t most) {
   values.push_back(std::move(value));
@@ -153,8 +137,9 @@ void DepthCheck::add(const cv::Mat& grey, const cv::Mat& depth, double timestamp
       cv::norm(small_grey, last_grey_, cv::NORM_L1) > kMoved * static_cast<double>(small_grey.total());
   if (!has_moved) return;
   last_grey_ = small_grey;
-  check_frozen(small_depth);
-  check_scale(small_depth, depth);
+  const DepthSpread spread = spread_of(small_depth);
+  check_frozen(spread, small_depth);
+  check_scale(spread, depth);
   if (auto verdict = compare(history_.back())) {
     push(verdicts_, std::move(*verdict), kWindow);
     judge();
@@ -165,17 +150,32 @@ void DepthCheck::note_tracking(bool is_tracked, bool is_keyframe) {
   push(troubles_, !is_tracked || is_keyframe, kFrames);
 }
 
-void DepthCheck::check_frozen(const cv::Mat& depth) {
+DepthCheck::DepthSpread DepthCheck::spread_of(const cv::Mat& depth) {
+  std::vector<float> known;
+  for (int y = 0; y < depth.rows; ++y) {
+    for (int x = 0; x < depth.cols; ++x) {
+      if (is_known(depth.at<float>(y, x))) known.push_back(depth.at<float>(y, x));
+    }
+  }
+  if (known.empty()) return {};
+  const auto percentile = [&](double share) {
+    const auto at =
+        known.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(known.size() - 1));
+    std::nth_element(known.begin(), at, known.end());
+    return static_cast<double>(*at);
+  };
+  return {static_cast<double>(known.size()) / static_cast<double>(depth.total()), percentile(0.05),
+          percentile(0.5), percentile(0.95)};
+}
+
+void DepthCheck::check_frozen(const DepthSpread& spread, const cv::Mat& small) {
   constexpr int kSamples = 10;        // in a row
-  constexpr double kKnown = 0.1;      // of the image
   constexpr double kConstant = 1e-3;  // of the depth
-  std::vector<float> known = known_depths(depth);
-  const bool is_known = static_cast<double>(known.size()) > kKnown * static_cast<double>(depth.total());
-  const bool is_same =
-      is_known && last_depth_.size() == depth.size() && cv::norm(depth, last_depth_, cv::NORM_INF) == 0.0;
+  const bool is_same = spread.known > kFewestKnown && last_depth_.size() == small.size() &&
+                       cv::norm(small, last_depth_, cv::NORM_INF) == 0.0;
   const bool is_constant =
-      is_known && percentile(known, 0.95) - percentile(known, 0.05) < kConstant * percentile(known, 0.5);
-  last_depth_ = depth;
+      spread.known > kFewestKnown && spread.far - spread.near < kConstant * spread.median;
+  last_depth_ = small;
   frozen_ = is_same ? frozen_ + 1 : 0;
   constant_ = is_constant ? constant_ + 1 : 0;
   if (constant_ >= kSamples)
@@ -184,29 +184,28 @@ void DepthCheck::check_frozen(const cv::Mat& depth) {
     raise("the depth image does not change while the colour image does; check the depth stream", is_misfit_);
 }
 
-void DepthCheck::check_scale(const cv::Mat& small, const cv::Mat& depth) {
+void DepthCheck::check_scale(const DepthSpread& spread, const cv::Mat& depth) {
   constexpr double kNear = 0.6;         // metres; 95 % of a depth image within it,
   constexpr double kMedianNear = 0.25;  // or half of it within this, is nearer than depth sensors measure
   constexpr double kFar = 15.0;         // metres; of farther scenes stereo of any baseline may be right
   constexpr std::size_t kEvery = 2;     // samples
-  std::vector<float> known = known_depths(small);
-  if (known.size() < small.total() / 10) return;
-  push(near_, percentile(known, 0.95), kWindow);
-  push(medians_, percentile(known, 0.5), kWindow);
+  if (spread.known < kFewestKnown) return;
+  push(far_, spread.far, kWindow);
+  push(medians_, spread.median, kWindow);
   if (samples_++ % kEvery == 0 && !is_large_) {
     scale_.add(depth, fx_);
     const auto baseline = scale_.implausible_baseline();
-    if (baseline && median_of(near_) < kFar)
+    if (baseline && median_of(far_) < kFar)
       raise(text_of("depth is implausibly large: its steps and shadows are those of a baseline of %.2f m; "
                     "depth_units_per_metre is probably too small",
                     *baseline),
             is_large_);
   }
-  if (near_.size() < kLeastSamples + kHistory) return;
-  if (median_of(near_) > kNear && median_of(medians_) > kMedianNear) return;
+  if (far_.size() < kLeastSamples + kHistory) return;
+  if (median_of(far_) > kNear && median_of(medians_) > kMedianNear) return;
   raise(text_of("depth is implausibly small: 95 %% of the image within %.2f m, half within %.2f m; "
                 "depth_units_per_metre is probably too large",
-                median_of(near_), median_of(medians_)),
+                median_of(far_), median_of(medians_)),
         is_small_);
 }
 

@@ -41,13 +41,20 @@ class DepthCheck {
     cv::Mat gradient_rank;         // CV_8UC1, 255 * share of the image with a lower gradient
     std::vector<cv::Point> edges;  // of depth
   };
+  struct DepthSpread {
+    double known = 0.0;  // share of the image
+    double near = 0.0;   // metres; percentiles 5, 50 and 95 of what is known
+    double median = 0.0;
+    double far = 0.0;
+  };
   struct Verdict {
     double registered = 0.0;         // mean rank of the gradient at depth edges, 0 to 1
     std::vector<double> advantages;  // of each alternative over it
   };
 
-  void check_scale(const cv::Mat& small, const cv::Mat& depth);
-  void check_frozen(const cv::Mat& depth);
+  void check_scale(const DepthSpread& spread, const cv::Mat& depth);
+  void check_frozen(const DepthSpread& spread, const cv::Mat& small);
+  static DepthSpread spread_of(const cv::Mat& depth);
   std::optional<Verdict> compare(const Sample& sample) const;
   struct Alternative {
     std::size_t index = 0;
@@ -60,7 +67,7 @@ class DepthCheck {
   std::deque<Sample> history_;
   std::deque<Verdict> verdicts_;
   std::deque<bool> troubles_;  // frames lost or made keyframes
-  std::deque<double> near_;    // depth that 95 % of an image are nearer than, metres
+  std::deque<double> far_;     // depth that 95 % of an image are nearer than, metres
   std::deque<double> medians_;
   cv::Mat last_grey_;  // of a small size
   cv::Mat last_depth_;

@@ -109,9 +109,10 @@ std::optional<double> DepthScale::implausible_baseline() const {
   // 0.11 m in steps of 1/16 pixel.
   constexpr double kImplausible = 0.55;
   constexpr double kShortest = 0.16;  // metres; shorter ones are plausible in themselves
-  const auto factor = step_factor();
   const auto width = baseline();
-  return factor && width && *width > std::max(kShortest, kImplausible * *factor) ? width : std::nullopt;
+  if (!width || *width <= kShortest) return std::nullopt;  // as with most sensors; the steps cost more
+  const auto factor = step_factor();
+  return factor && *width > kImplausible * *factor ? width : std::nullopt;
 }
 
 }  // namespace roslam

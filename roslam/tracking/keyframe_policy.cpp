@@ -63,7 +63,7 @@ template <typename Visit>
 void for_each_in_view(const Map& map, const TrackedFrame& frame, const Camera& camera, const cv::Size& image,
                       const Visit& visit) {
   const Keyframe* reference = map.find(frame.reference);
-  if (reference == nullptr || !frame.T_camera_world) return;
+  if (image.empty() || reference == nullptr || !frame.T_camera_world) return;
   for (const LandmarkId id : reference->landmarks) {
     const Landmark* landmark = map.find(id);
     if (landmark == nullptr) continue;

@@ -25,8 +25,7 @@ struct BenchmarkArguments {
 };
 
 /// --sequences, --camera, --out, --runs, --real-time, --config, --frames, --seed, --traffic, --overwrite,
-/// --quiet,
-/// --json.
+/// --quiet, --json.
 void add_benchmark_options(CLI::App& command, BenchmarkArguments& arguments);
 
 /// The folder of --out, for this benchmark alone while it runs. Throws as OutputFolder does.

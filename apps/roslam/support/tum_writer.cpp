@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "roslam/common/error.hpp"
+#include "roslam/common/write_file.hpp"
 
 namespace roslam::app {
 
@@ -18,17 +19,10 @@ cv::Mat packed_depth(const cv::Mat& depth, double units_per_metre) {
   return image;
 }
 
-namespace {
-std::filesystem::path part_of(const std::filesystem::path& file) {
-  std::error_code error;
-  const auto old = std::filesystem::status(file, error);
-  if (std::filesystem::exists(old) && !std::filesystem::is_regular_file(old)) return file;
-  return std::filesystem::path(file) += ".part";
-}
-}  // namespace
-
 TextFile::TextFile(std::filesystem::path file)
-    : file_(std::move(file)), part_(part_of(file_)), stream_(part_) {
+    : file_(std::move(file)),
+      part_(is_device(file_) ? file_ : std::filesystem::path(file_) += ".part"),
+      stream_(part_) {
   check();
   std::error_code error;
   if (part_ != file_) std::filesystem::remove(file_, error);
