@@ -15,6 +15,7 @@ void register_bundle_benchmarks();
 void register_place_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
 void register_restoration_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
 void register_dense_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
+void register_inference_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
 void register_segmentation_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
 void register_slam_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
 

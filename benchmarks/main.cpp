@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
   rb::register_place_benchmarks(flight);
   rb::register_restoration_benchmarks(flight);
   rb::register_dense_benchmarks(flight);
+  rb::register_inference_benchmarks(flight);
   rb::register_segmentation_benchmarks(flight);
   rb::register_slam_benchmarks(flight);
   benchmark::RunSpecifiedBenchmarks();

@@ -14,7 +14,7 @@
 #include "roslam/loop_closing/loop_closer.hpp"
 #include "roslam/map/map_mutex.hpp"
 #include "roslam/map_io/map_file.hpp"
-#include "roslam/slam/options.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/slam/settings.hpp"
 #include "tests/loop_scene.hpp"
 

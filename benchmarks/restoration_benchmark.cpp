@@ -26,7 +26,7 @@ PosedImage taken(const Frame& frame, const std::vector<cv::Rect>& objects) {
 
 std::shared_ptr<Inpainter> network() {
   const auto models = find_restoration_models();
-  return models.empty() ? nullptr : std::make_shared<GanInpainter>(models, InferenceBackend::kOpenCv);
+  return models.empty() ? nullptr : std::make_shared<GanInpainter>(models);
 }
 
 // Reprojects from ten images that show everything hidden, or from none; the rest is inpainted by the network

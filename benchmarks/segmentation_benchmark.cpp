@@ -32,8 +32,9 @@ void label_scores(benchmark::State& state) {
           static_cast<float>((i / 192 / 24 + i % 192 / 24) % kClasses == c ? 5 : c % 3);
     }
   }
+  const ScoreGrid grid = ScoreGrid::from_planes(scores);
   for (auto _ : state) {
-    const Segmentation segmentation = labels_from_scores(scores, {640, 480});
+    const Segmentation segmentation = labels_from_scores(grid, {640, 480});
     benchmark::DoNotOptimize(segmentation.labels.data);
   }
 }
@@ -42,9 +43,12 @@ void label_scores(benchmark::State& state) {
 void register_segmentation_benchmarks(const std::shared_ptr<RenderedFlight>& flight) {
   using benchmark::RegisterBenchmark;
   for (const auto& [name, backend] :
-       {std::pair("segmentation/opencv", InferenceBackend::kOpenCv),
+       {std::pair("segmentation/own", InferenceBackend::kOwn),
+        std::pair("segmentation/opencv", InferenceBackend::kOpenCv),
         std::pair("segmentation/onnx_runtime", InferenceBackend::kOnnxRuntime)}) {
     if (backend == InferenceBackend::kOnnxRuntime && !has_onnx_runtime()) continue;
+    if (backend == InferenceBackend::kOpenCv && !has_opencv_dnn()) continue;
+    if (backend == InferenceBackend::kOwn && own_instruction_set().empty()) continue;
     RegisterBenchmark(name, [flight, backend = backend](auto& state) { segment(state, *flight, backend); })
         ->Unit(benchmark::kMillisecond)
         ->Arg(256)

@@ -23,7 +23,7 @@ function(roslam_component name remedy)
   set(ROSLAM_HAS_${name} ${has} PARENT_SCOPE)
 endfunction()
 
-roslam_component(SEMANTICS libopencv-dev "TARGET;opencv_dnn;AND;TARGET;opencv_photo")
+roslam_component(SEMANTICS nothing TRUE)
 roslam_component(DENSE liboctomap-dev octomap_FOUND)
 roslam_component(SIMULATION libembree-dev embree_FOUND)
 

@@ -20,7 +20,7 @@ set(ROSLAM_PUBLIC_HEADERS
   features/orb_extractor.hpp
   estimation/estimation_options.hpp
   estimation/measurement_model.hpp
-  semantics/inference.hpp
+  inference/inference.hpp
   semantics/label_set.hpp
   semantics/pspnet_segmenter.hpp
   semantics/segmenter.hpp
@@ -51,9 +51,9 @@ set(ROSLAM_PUBLIC_HEADERS
   dense/surface_file.hpp
   dense/surface_map.hpp
   slam/frame_result.hpp
-  slam/mode.hpp
+  options/mode.hpp
   slam/open_slam.hpp
-  slam/options.hpp
+  options/options.hpp
   slam/restored_keyframe.hpp
   slam/run.hpp
   slam/slam.hpp

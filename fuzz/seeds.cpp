@@ -9,7 +9,8 @@
 #include "roslam/dense/surface_file.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/map_io/map_file.hpp"
-#include "roslam/slam/options.hpp"
+#include "roslam/options/options.hpp"
+#include "tests/onnx_writer.hpp"
 
 namespace {
 using namespace roslam;
@@ -57,6 +58,33 @@ SurfaceMap small_surface() {
   surface.triangles = {{0, 1, 2}, {1, 3, 2}};
   return surface;
 }
+
+std::string small_network() {
+  const auto ones = [](int count) { return std::vector<float>(static_cast<std::size_t>(count), 1.0F); };
+  OnnxWriter writer;
+  writer.array("w3", {4, 3, 3, 3}, ones(108))
+      .array("d", {4, 1, 3, 3}, ones(36))
+      .array("w1", {4, 4, 1, 1}, ones(16))
+      .array("b", {4}, ones(4))
+      .array("scales", {4}, {1, 1, 2, 2})
+      .array("roi", {0}, {})
+      .array("w2", {2, 8, 1, 1}, ones(16))
+      .array("t", {2, 3, 2, 2}, ones(24))
+      .node("Conv", {"in", "w3", "b"}, "a", {{"pads", {1, 1, 1, 1}}, {"strides", {2, 2}}})
+      .node("Relu", {"a"}, "r")
+      .node("Conv", {"r", "d"}, "e", {{"pads", {1, 1, 1, 1}}, {"group", {4}}})
+      .node("Conv", {"e", "w1", "b"}, "f")
+      .node("Add", {"r", "f"}, "g")
+      .node("AveragePool", {"g"}, "h", {{"kernel_shape", {2, 2}}, {"strides", {2, 2}}})
+      .node("Resize", {"h", "roi", "scales"}, "i", {}, "mode", "linear")
+      .node("GlobalAveragePool", {"g"}, "j")
+      .node("Add", {"g", "j"}, "k")
+      .node("Concat", {"i", "k"}, "l", {{"axis", {1}}})
+      .node("Conv", {"l", "w2"}, "m")
+      .node("Sigmoid", {"m"}, "n")
+      .node("ConvTranspose", {"n", "t"}, "out", {{"kernel_shape", {2, 2}}, {"strides", {2, 2}}});
+  return writer.file("in", 3, "out");
+}
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -77,6 +105,7 @@ int main(int count, char** arguments) {
     const std::vector<std::vector<Descriptor>> images{random_descriptors(60)};
     put("vocabulary", Vocabulary::train(images, {.branching = 3, .depth = 3}).content());
     put("map", encode_map(small_map()));
+    put("network", small_network());
     put("surface_ply",
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
         "element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 1e0\n3 0 1 2\n");

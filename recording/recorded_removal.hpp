@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "evaluation/removal_error.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/restoration/removed_region.hpp"
-#include "roslam/slam/options.hpp"
 
 namespace roslam::recording {
 

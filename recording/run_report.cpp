@@ -72,6 +72,7 @@ Json frames_json(const Slam& slam, const RunResults& summary, const FrameSource&
           {"with_pose", counts.with_pose},
           {"complete", counts.is_complete()},
           {"dropped", counts.dropped},
+          {"dropped_in_a_row", summary.longest_gap},
           {"by_state", by_state},
           {"skipped", counts_json(counts.skipped)},
           {"clock_resets", slam.clock_resets()},
@@ -96,6 +97,7 @@ Json times_json(const StageTimes& times) {
 Json dynamic_json(const Slam& slam, const RunResults& summary, const RunDescription& description) {
   Json json{{"mode", mode_of(slam.options().dynamic_objects)},
             {"model", description.segmentation_model},
+            {"backends", slam.backends()},
             {"labelling_faults", counts_json(slam.labelling_faults())}};
   if (!summary.removal) return json;
   const RemovalTally& tally = *summary.removal;
@@ -229,6 +231,7 @@ std::string run_report(const Slam& slam, const RunResults& summary, const FrameS
   json["interrupted"] = summary.interrupted;
   json["error"] = summary.failure ? Json(message_of(summary.failure)) : Json(nullptr);
   json["frames"] = frames_json(slam, summary, source);
+  json["gave_way"] = counts_json(slam.gave_way());
   json["warnings"] = counts_json(slam.warnings());
   json["dynamic"] = dynamic_json(slam, summary, description);
   if (slam.restores())

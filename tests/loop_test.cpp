@@ -4,7 +4,7 @@
 
 #include "roslam/loop_closing/loop_closer.hpp"
 #include "roslam/loop_closing/map_correction.hpp"
-#include "roslam/slam/options.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/slam/settings.hpp"
 #include "tests/loop_scene.hpp"
 

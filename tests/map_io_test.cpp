@@ -10,7 +10,7 @@
 #include "roslam/common/write_file.hpp"
 #include "roslam/map_io/map_file.hpp"
 #include "roslam/map_io/merge_maps.hpp"
-#include "roslam/slam/options.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/slam/settings.hpp"
 #include "tests/loop_scene.hpp"
 #include "tests/scratch.hpp"

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "roslam/common/error.hpp"
-#include "roslam/slam/options_fields.hpp"
+#include "roslam/options/options_fields.hpp"
 #include "tests/scratch.hpp"
 
 namespace roslam {

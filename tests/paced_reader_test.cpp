@@ -155,12 +155,13 @@ TEST(PacedReader, ThePaceIsKeptAfterATimeThatIsNotFinite) {
   }
 }
 
-TEST(PacedReader, ASlowConsumerGetsTheNewestFramesAndTheOthersAreCounted) {
+TEST(PacedReader, ASlowConsumerGetsFramesSpreadOverTheStallAndTheOthersAreCounted) {
   FakeSource source(every(0.001, 20));
   PacedReader reader(source, 3);
   ASSERT_TRUE(source.wait_for_end());
-  EXPECT_EQ(indices_of_rest(reader), (std::vector<std::size_t>{17, 18, 19}));
-  EXPECT_EQ(reader.dropped(), 17U);
+  EXPECT_EQ(indices_of_rest(reader), (std::vector<std::size_t>{0, 4, 8, 12, 14, 16, 18, 19}));
+  EXPECT_EQ(reader.dropped(), 12U);
+  EXPECT_EQ(reader.longest_gap(), 3U);
 }
 
 TEST(PacedReader, DropsNothingWhileThereIsRoom) {

@@ -19,8 +19,8 @@
 #include "roslam/loop_closing/loop_closer.hpp"
 #include "roslam/map/keyframe_pose_table.hpp"
 #include "roslam/mapping/local_mapper.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/slam/keyframe_worker.hpp"
-#include "roslam/slam/options.hpp"
 #include "roslam/slam/settings.hpp"
 #include "tests/loop_scene.hpp"
 

@@ -8,8 +8,8 @@
 #include <random>
 
 #include "roslam/common/error.hpp"
+#include "roslam/inference/plan/onnx_image_size.hpp"
 #include "roslam/semantics/label_set.hpp"
-#include "roslam/semantics/onnx_image_size.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
 #include "roslam/semantics/score_labels.hpp"
 #include "tests/program.hpp"
@@ -113,7 +113,7 @@ class ScoreLabels : public testing::TestWithParam<cv::Size> {};
 
 TEST_P(ScoreLabels, AreTheBestClassAfterBilinearInterpolation) {
   const cv::Mat scores = random_scores(18, 24, 7);
-  const Segmentation result = labels_from_scores(scores, GetParam());
+  const Segmentation result = labels_from_scores(ScoreGrid::from_planes(scores), GetParam());
   ASSERT_EQ(result.labels.size(), GetParam());
   int different = 0;
   for (int y = 0; y < result.labels.rows; ++y) {
@@ -139,7 +139,7 @@ TEST(ScoreLabels, ConfidenceIsTheMeanProbabilityWhereAClassWasChosen) {
   scores.ptr<float>(0, 11)[0] = 2.0F;
   scores.ptr<float>(0, 11)[1] = 4.0F;
   const auto probability = [](double score) { return std::exp(score) / (std::exp(score) + kClasses - 1); };
-  const Segmentation result = labels_from_scores(scores, {2, 1});
+  const Segmentation result = labels_from_scores(ScoreGrid::from_planes(scores), {2, 1});
   EXPECT_NEAR(result.confidence[11], 0.5 * (probability(2.0) + probability(4.0)), 1e-5);
   EXPECT_EQ(result.confidence[0], 0.0F);
 }

@@ -80,6 +80,7 @@ SlamSetup setup_of(const FlightArguments& arguments, const std::shared_ptr<Resto
   setup.segmentation_model = arguments.model;
   setup.restoration_models = arguments.models;
   setup.vocabulary = arguments.vocabulary;
+  setup.backend = arguments.backend;
   if (!arguments.map.empty()) setup.map = map_file(arguments.map);
   setup.restore_keyframes = arguments.restore;
   setup.on_restored = [restorations](const RestoredKeyframe& keyframe) {

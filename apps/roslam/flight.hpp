@@ -29,8 +29,9 @@ struct FlightArguments {
   bool no_dense = false;  ///< make no dense map
   bool restore = false;   ///< write the keyframes without what moves to the folder restored
   std::string models;     ///< folder of the networks that paint, in place of the shipped ones
-  bool quiet = false;     ///< no progress
-  bool overwrite = false;  ///< replace files in the folder that no run wrote
+  InferenceBackend backend = InferenceBackend::kAutomatic;  ///< what runs the networks
+  bool quiet = false;                                       ///< no progress
+  bool overwrite = false;                                   ///< replace files in the folder that no run wrote
 };
 
 /// A flight that came to its end.

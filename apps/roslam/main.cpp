@@ -9,6 +9,7 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <string>
 
+#include "apps/roslam/support/backend_option.hpp"
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/help_formatter.hpp"
 #include "apps/roslam/support/output.hpp"
@@ -76,7 +77,8 @@ int main(int argc, char** argv) {
   CLI::App program("RO-SLAM: RGB-D SLAM for drones in dynamic environments.", "roslam");
   program.formatter(std::make_shared<roslam::app::HelpFormatter>(roslam::app::terminal_width()));
   program.require_subcommand(1);
-  program.set_version_flag("--version", roslam::kVersion);
+  program.set_version_flag("--version", std::string(roslam::kVersion) +
+                                            "\nnetworks run with: " + roslam::app::backends_in_words());
   add_commands(program);
   try {
     return execute(program, argc, argv);

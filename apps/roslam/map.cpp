@@ -22,8 +22,8 @@
 #include "roslam/map/map_ply.hpp"
 #include "roslam/map_io/map_file.hpp"
 #include "roslam/map_io/merge_maps.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/place_recognition/vocabulary.hpp"
-#include "roslam/slam/options.hpp"
 #include "roslam/slam/settings.hpp"
 
 namespace roslam::app {

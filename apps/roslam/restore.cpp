@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/roslam/flight.hpp"
+#include "apps/roslam/support/backend_option.hpp"
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/inpainter.hpp"
 #include "apps/roslam/support/interrupt.hpp"
@@ -68,9 +69,9 @@ std::string name_of_files(const FrameSource& source, const Frame& frame) {
 
 std::shared_ptr<Inpainter> inpainter_for(const RestoreArguments& arguments,
                                          const RestorationOptions& options) {
-  if (arguments.method == "gan") return require_inpainter(arguments.models);
+  if (arguments.method == "gan") return require_inpainter(arguments.models, arguments.flight.backend);
   const bool is_wanted = options.inpaint && (arguments.method.empty() || arguments.method == "both");
-  return is_wanted ? open_inpainter(arguments.models) : nullptr;
+  return is_wanted ? app::open_inpainter(arguments.models, arguments.flight.backend) : nullptr;
 }
 
 StaticSceneRestorer::Settings settings_for(const RestoreArguments& arguments, const RecordedRun& run) {
@@ -244,6 +245,7 @@ void add_restore_command(CLI::App& program, const std::string& version) {
   command->add_option(
       "--models", arguments->models,
       "Folder with the inpainting networks (roslam-restorer-*.onnx); default the shipped ones");
+  add_backend_option(*command, arguments->flight.backend);
   command
       ->add_option("--every", arguments->every,
                    "Restore every N-th frame; the others still serve as source images")

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/roslam/flight.hpp"
+#include "apps/roslam/support/backend_option.hpp"
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/interrupt.hpp"
 #include "apps/roslam/support/output.hpp"
@@ -204,6 +205,7 @@ void add_run_command(CLI::App& program, const std::string& version) {
           "bicycles), geometry (depth and optical flow) or both; default both, unless --config differs. For "
           "comparison: ds-slam-like, dynaslam-like")
       ->check(CLI::IsMember(dynamic_modes()));
+  add_backend_option(*command, arguments->flight.backend);
   command->add_option("--model", arguments->flight.model,
                       "Weights of the segmentation network (ONNX); default the shipped ones");
   command->add_option("--vocabulary", arguments->flight.vocabulary,

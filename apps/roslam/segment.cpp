@@ -11,6 +11,7 @@
 #include <system_error>
 #include <vector>
 
+#include "apps/roslam/support/backend_option.hpp"
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/image_source.hpp"
 #include "apps/roslam/support/interrupt.hpp"
@@ -164,6 +165,7 @@ void segment(const SegmentArguments& arguments) {
   const LabelSet set = *label_set_from(arguments.classes);
   const fs::path model = model_of(arguments);
   PspnetSegmenter segmenter(model, arguments.options, arguments.backend);
+  if (!segmenter.note().empty()) std::cerr << "note: " << segmenter.note() << "\n";
   const auto source = open_images({arguments.inputs.begin(), arguments.inputs.end()});
   protect_inputs(arguments);
   recording::OutputFolder out(arguments.out, "segment", {"labels.json"}, arguments.overwrite);
@@ -217,14 +219,7 @@ void add_segment_command(CLI::App& program) {
                    "Longer side of the network's input, pixels: less is faster, more is finer")
       ->check(CLI::Range(32, 4096))
       ->capture_default_str();
-  const std::map<std::string, InferenceBackend> backends{{"auto", InferenceBackend::kAutomatic},
-                                                         {"opencv", InferenceBackend::kOpenCv},
-                                                         {"onnxruntime", InferenceBackend::kOnnxRuntime}};
-  command
-      ->add_option("--backend", arguments->backend,
-                   "Inference backend; default auto: ONNX Runtime where built with it, else OpenCV")
-      ->transform(CLI::CheckedTransformer(backends).description(""))
-      ->type_name("auto|opencv|onnxruntime");
+  add_backend_option(*command, arguments->backend);
   command->add_flag("--overwrite", arguments->overwrite,
                     "Replace files in the folder of --out that this command did not write");
   command->add_flag("--quiet", arguments->quiet, "Print no progress");

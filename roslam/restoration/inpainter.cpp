@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/restoration/inpainter.hpp"
 
-#include <opencv2/dnn.hpp>
 #include <string>
 
 #include "roslam/common/error.hpp"

@@ -6,9 +6,10 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <string>
 
 #include "roslam/common/export.hpp"
-#include "roslam/semantics/inference.hpp"
+#include "roslam/inference/inference.hpp"
 #include "roslam/semantics/label_set.hpp"
 
 namespace roslam {
@@ -27,6 +28,12 @@ class ROSLAM_EXPORT Inpainter {
   /// hole (eq. 18), pixels of the crop. kind: class of the removed object. Returns the whole generated crop,
   /// CV_8UC3 (BGR); the caller keeps the known pixels. Throws ModelError.
   virtual cv::Mat inpaint(const cv::Mat& crop, const cv::Mat& hole, const cv::Rect& square, Movable kind) = 0;
+
+  /// What runs the networks, such as "own (AVX2)"; empty if there are none.
+  virtual std::string backend() const { return {}; }
+
+  /// Why a faster backend was not chosen, for the user; empty if it was.
+  virtual std::string note() const { return {}; }
 };
 
 /// The GAN generator with region normalisation (section 3.3), with an encoder for each object class.
@@ -38,6 +45,9 @@ class ROSLAM_EXPORT GanInpainter : public Inpainter {
                         InferenceBackend backend = InferenceBackend::kAutomatic);
 
   cv::Mat inpaint(const cv::Mat& crop, const cv::Mat& hole, const cv::Rect& square, Movable kind) override;
+
+  std::string backend() const override { return networks_[0].inference->backend(); }
+  std::string note() const override { return networks_[0].inference->note(); }
 
  private:
   struct Network {
@@ -52,9 +62,10 @@ ROSLAM_EXPORT std::filesystem::path find_restoration_models();
 
 /// The networks of a folder, or without a name the installed ones; null if these are missing. Throws
 /// ModelError.
-inline std::shared_ptr<Inpainter> open_inpainter(const std::filesystem::path& folder = {}) {
+inline std::shared_ptr<Inpainter> open_inpainter(const std::filesystem::path& folder = {},
+                                                 InferenceBackend backend = InferenceBackend::kAutomatic) {
   const std::filesystem::path models = folder.empty() ? find_restoration_models() : folder;
-  return models.empty() ? nullptr : std::make_shared<GanInpainter>(models);
+  return models.empty() ? nullptr : std::make_shared<GanInpainter>(models, backend);
 }
 
 }  // namespace roslam

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// In place of inpainter.cpp and diffusion_inpainting.cpp in a library without the component semantics.
+// In place of inpainter.cpp in a library without the component semantics.
 #include "roslam/common/error.hpp"
-#include "roslam/restoration/diffusion_inpainting.hpp"
 #include "roslam/restoration/inpainter.hpp"
 
 namespace roslam {
@@ -13,9 +12,5 @@ GanInpainter::GanInpainter(const std::filesystem::path& folder, InferenceBackend
 cv::Mat GanInpainter::inpaint(const cv::Mat& crop, const cv::Mat&, const cv::Rect&, Movable) { return crop; }
 
 std::filesystem::path find_restoration_models() { return {}; }
-
-bool has_diffusion_inpainting() { return false; }
-
-void inpaint_by_diffusion(cv::Mat&, const cv::Mat&, ClassicMethod) {}
 
 }  // namespace roslam

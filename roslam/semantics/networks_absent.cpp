@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // In place of inference.cpp and pspnet_segmenter.cpp in a library without the component semantics.
 #include "roslam/common/error.hpp"
-#include "roslam/semantics/inference.hpp"
+#include "roslam/inference/inference.hpp"
+#include "roslam/inference/score_grid.hpp"
 #include "roslam/semantics/pspnet_segmenter.hpp"
 
 namespace roslam {
@@ -10,9 +11,15 @@ namespace {
 constexpr const char* kAbsent = "this library was built without networks (ROSLAM_SEMANTICS)";
 }
 
+ScoreGrid Inference::scores(const cv::Mat&) { throw ModelError(kAbsent); }
+
 bool has_onnx_runtime() { return false; }
 
-std::unique_ptr<Inference> load_inference(const std::filesystem::path& model, InferenceBackend) {
+bool has_opencv_dnn() { return false; }
+
+std::string own_instruction_set() { return {}; }
+
+std::unique_ptr<Inference> load_inference(const std::filesystem::path& model, InferenceBackend, int) {
   throw ModelError(model.string() + ": " + kAbsent);
 }
 
@@ -24,6 +31,10 @@ PspnetSegmenter::PspnetSegmenter(const std::filesystem::path& model, const Segme
 }
 
 Segmentation PspnetSegmenter::segment(const cv::Mat&) { throw ModelError(kAbsent); }
+
+std::string PspnetSegmenter::backend() const { return {}; }
+
+std::string PspnetSegmenter::note() const { return {}; }
 
 std::filesystem::path find_segmentation_model() { return {}; }
 

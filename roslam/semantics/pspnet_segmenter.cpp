@@ -2,13 +2,13 @@
 #include "roslam/semantics/pspnet_segmenter.hpp"
 
 #include <algorithm>
-#include <opencv2/dnn.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/resources.hpp"
 #include "roslam/common/stopwatch.hpp"
+#include "roslam/inference/score_grid.hpp"
 #include "roslam/semantics/score_labels.hpp"
 
 namespace roslam {
@@ -46,30 +46,30 @@ PspnetSegmenter::PspnetSegmenter(const std::filesystem::path& model, const Segme
                                  InferenceBackend backend)
     : model_(model), options_(options) {
   options_.validate();
-  inference_ = load_inference(model, backend);
-  const int size[] = {1, 3, 2 * kSegmenterMultiple,
-                      2 * kSegmenterMultiple};  // trial run to check the shape of the output
-  if (!cv::checkRange(scores_for(cv::Mat(4, size, CV_32F, cv::Scalar(0))))) {
+  inference_ = load_inference(model, backend, options.threads);
+  const int side = 2 * kSegmenterMultiple;  // trial run to check the shape of the output
+  const int size[] = {1, 3, side, side};
+  const cv::Mat scores = inference_->run(cv::Mat(4, size, CV_32F, cv::Scalar(0)));
+  const bool has_shape = scores.dims == 4 && scores.type() == CV_32F && scores.size[0] == 1;
+  if (!has_shape) check_scores({}, 0, {side, side});
+  check_scores({scores.size[3], scores.size[2]}, scores.size[1], {side, side});
+  if (!cv::checkRange(scores)) {
     throw ModelError(model_.string() + ": gives scores that are not finite; install the model again");
   }
 }
 
-cv::Mat PspnetSegmenter::scores_for(const cv::Mat& blob) {
-  const cv::Mat scores = inference_->run(blob);
-  const bool has_shape = scores.dims == 4 && scores.type() == CV_32F && scores.size[0] == 1;
-  if (!has_shape || scores.size[1] != kClasses) {
+void PspnetSegmenter::check_scores(const cv::Size& scores, int classes, const cv::Size& image) const {
+  if (classes != kClasses) {
     throw ModelError(model_.string() + ": gives " +
-                     (has_shape ? std::to_string(scores.size[1]) + " classes" : "no class scores") +
+                     (classes > 0 ? std::to_string(classes) + " classes" : "no class scores") +
                      " where the " + std::to_string(kClasses) +
                      " of Cityscapes are expected; install the model that belongs to this version");
   }
-  if (scores.size[2] < 1 || scores.size[2] > blob.size[2] || scores.size[3] < 1 ||
-      scores.size[3] > blob.size[3]) {
+  if (scores.empty() || scores.height > image.height || scores.width > image.width) {
     throw ModelError(model_.string() +
                      ": gives scores whose shape does not match the image; install the model that "
                      "belongs to this version");
   }
-  return scores;
 }
 
 Segmentation PspnetSegmenter::segment(const cv::Mat& image) {
@@ -78,11 +78,16 @@ Segmentation PspnetSegmenter::segment(const cv::Mat& image) {
   const cv::Size size = working_size(bgr.size(), options_.working_side);
   cv::resize(bgr, input_image_, size, 0, 0,
              size.area() < bgr.size().area() ? cv::INTER_AREA : cv::INTER_LINEAR);
-  cv::dnn::blobFromImage(input_image_, blob_, 1.0 / 255.0, {}, {}, true);
-  Segmentation result = labels_from_scores(scores_for(blob_), bgr.size());
+  const ScoreGrid grid = inference_->scores(input_image_);
+  check_scores({grid.columns(), grid.rows()}, grid.scores.channels, size);
+  Segmentation result = labels_from_scores(grid, bgr.size());
   result.seconds = watch.seconds();
   return result;
 }
+
+std::string PspnetSegmenter::backend() const { return inference_->backend(); }
+
+std::string PspnetSegmenter::note() const { return inference_->note(); }
 
 std::filesystem::path find_segmentation_model() { return find_resource("roslam-pspnet.onnx"); }
 

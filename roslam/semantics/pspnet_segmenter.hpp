@@ -3,10 +3,11 @@
 
 #include <filesystem>
 #include <memory>
+#include <string>
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/export.hpp"
-#include "roslam/semantics/inference.hpp"
+#include "roslam/inference/inference.hpp"
 #include "roslam/semantics/segmenter.hpp"
 #include "roslam/semantics/segmenter_options.hpp"
 
@@ -27,14 +28,16 @@ class ROSLAM_EXPORT PspnetSegmenter : public Segmenter {
 
   const SegmenterOptions& options() const { return options_; }
 
+  std::string backend() const override;
+  std::string note() const override;
+
  private:
-  cv::Mat scores_for(const cv::Mat& blob);
+  void check_scores(const cv::Size& scores, int classes, const cv::Size& image) const;
 
   std::filesystem::path model_;
   SegmenterOptions options_;
   std::unique_ptr<Inference> inference_;
   cv::Mat input_image_;  // reused between calls: allocating it for each image takes longer than filling it
-  cv::Mat blob_;
 };
 
 /// The weights supplied with the program: models/roslam-pspnet.onnx beside the program or its build folder,

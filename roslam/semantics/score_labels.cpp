@@ -39,64 +39,19 @@ Row mixed(const Row& a, const Row& b, float weight) {
   return row;
 }
 
-// The network's scores, one plane per class, with the best class of each grid point.
-struct Grid {
-  int rows;
-  int columns;
-  std::array<const float*, kClasses> planes{};
-  std::vector<float> highest;
-  std::vector<int> best;
-
-  explicit Grid(const cv::Mat& scores)
-      : rows(scores.size[2]), columns(scores.size[3]), highest(points()), best(points(), 0) {
-    for (int c = 0; c < kClasses; ++c) planes[static_cast<std::size_t>(c)] = scores.ptr<float>(0, c);
-    std::copy_n(planes[0], points(), highest.begin());
-    for (int c = 1; c < kClasses; ++c) {
-      const float* plane = planes[static_cast<std::size_t>(c)];
-      for (std::size_t i = 0; i < points(); ++i) {
-        const bool is_better = plane[i] > highest[i];
-        highest[i] = is_better ? plane[i] : highest[i];
-        best[i] = is_better ? c : best[i];
-      }
-    }
-  }
-
-  std::size_t points() const { return static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns); }
-
-  std::size_t at(int row, int column) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
-           static_cast<std::size_t>(column);
-  }
-
-  // Interpolated between two points of a column.
-  Row scores_between(std::size_t above, std::size_t below, float weight) const {
-    Row row;
-    for (std::size_t c = 0; c < kClasses; ++c) {
-      row[c] = planes[c][above] + (planes[c][below] - planes[c][above]) * weight;
-    }
-    return row;
-  }
-};
-
-// Softmax probability of each point's best class.
-cv::Mat probabilities(const Grid& grid) {
-  const cv::Mat highest(1, static_cast<int>(grid.points()), CV_32F, const_cast<float*>(grid.highest.data()));
-  cv::Mat sum = cv::Mat::zeros(highest.size(), CV_32F);
-  cv::Mat share;
-  for (const float* plane : grid.planes) {
-    cv::subtract(cv::Mat(highest.size(), CV_32F, const_cast<float*>(plane)), highest, share);
-    cv::exp(share, share);
-    sum += share;
-  }
-  return cv::Mat(1.0 / sum).reshape(1, grid.rows);
+// Interpolated between two points of a column.
+Row scores_between(const float* above, const float* below, float weight) {
+  Row row;
+  for (std::size_t c = 0; c < kClasses; ++c) row[c] = above[c] + (below[c] - above[c]) * weight;
+  return row;
 }
 
-std::array<float, kClasses> means_by_class(const Grid& grid, const cv::Mat& probability) {
-  const auto* of_point = probability.ptr<float>();
+std::array<float, kClasses> means_by_class(const ScoreGrid& grid) {
+  const auto* of_point = grid.probability.ptr<float>();
   std::array<double, kClasses> sums{};
   std::array<int, kClasses> counts{};
-  for (std::size_t i = 0; i < grid.points(); ++i) {
-    const auto c = static_cast<std::size_t>(grid.best[i]);
+  for (std::size_t i = 0; i < grid.best.size(); ++i) {
+    const std::size_t c = grid.best[i];
     sums[c] += static_cast<double>(of_point[i]);
     ++counts[c];
   }
@@ -108,29 +63,29 @@ std::array<float, kClasses> means_by_class(const Grid& grid, const cv::Mat& prob
 }
 
 // Labels pixels begin..end of a row, all of them between the same two columns of the grid.
-void label_span(const Grid& grid, const Axis& across, int above, int below, float down, int begin, int end,
-                std::uint8_t* out) {
+void label_span(const ScoreGrid& grid, const Axis& across, int above, int below, float down, int begin,
+                int end, std::uint8_t* out) {
   const auto x = static_cast<std::size_t>(begin);
-  const std::size_t corners[4] = {grid.at(above, across.first[x]), grid.at(above, across.second[x]),
-                                  grid.at(below, across.first[x]), grid.at(below, across.second[x])};
-  const int best = grid.best[corners[0]];
-  if (best == grid.best[corners[1]] && best == grid.best[corners[2]] && best == grid.best[corners[3]]) {
+  const int left = across.first[x];
+  const int right = across.second[x];
+  const int best = grid.best[grid.index(above, left)];
+  if (best == grid.best[grid.index(above, right)] && best == grid.best[grid.index(below, left)] &&
+      best == grid.best[grid.index(below, right)]) {
     std::memset(out + begin, best, static_cast<std::size_t>(end - begin));
     return;
   }
-  const Row left = grid.scores_between(corners[0], corners[2], down);
-  const Row right = grid.scores_between(corners[1], corners[3], down);
+  const Row before = scores_between(grid.scores.at(above, left), grid.scores.at(below, left), down);
+  const Row after = scores_between(grid.scores.at(above, right), grid.scores.at(below, right), down);
   for (int i = begin; i < end; ++i) {
     out[i] =
-        static_cast<std::uint8_t>(best_of(mixed(left, right, across.weight[static_cast<std::size_t>(i)])));
+        static_cast<std::uint8_t>(best_of(mixed(before, after, across.weight[static_cast<std::size_t>(i)])));
   }
 }
 }  // namespace
 
-Segmentation labels_from_scores(const cv::Mat& scores, const cv::Size& size) {
-  const Grid grid(scores);
-  const Axis across(size.width, grid.columns);
-  const Axis along(size.height, grid.rows);
+Segmentation labels_from_scores(const ScoreGrid& grid, const cv::Size& size) {
+  const Axis across(size.width, grid.columns());
+  const Axis along(size.height, grid.rows());
   std::vector<int> starts{0};  // where the pair of grid columns changes
   for (int x = 1; x < size.width; ++x) {
     const auto i = static_cast<std::size_t>(x);
@@ -146,8 +101,8 @@ Segmentation labels_from_scores(const cv::Mat& scores, const cv::Size& size) {
                  result.labels.ptr<std::uint8_t>(y));
     }
   }
-  result.probability = probabilities(grid);
-  result.confidence = means_by_class(grid, result.probability);
+  result.probability = grid.probability;
+  result.confidence = means_by_class(grid);
   return result;
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <opencv2/core.hpp>
+#include <string>
 
 #include "roslam/common/export.hpp"
 #include "roslam/semantics/label_set.hpp"
@@ -30,6 +31,12 @@ class ROSLAM_EXPORT Segmenter {
   /// gives the same labels. Throws InputError for an empty image or another type, ModelError if the network
   /// fails.
   virtual Segmentation segment(const cv::Mat& image) = 0;
+
+  /// What runs the network, such as "own (AVX2)"; empty if there is no network.
+  virtual std::string backend() const { return {}; }
+
+  /// Why a faster backend was not chosen, for the user; empty if it was.
+  virtual std::string note() const { return {}; }
 };
 
 }  // namespace roslam

@@ -5,17 +5,11 @@
 
 namespace roslam {
 
-/// Library that runs the network.
-enum class InferenceBackend {
-  kAutomatic,   ///< ONNX Runtime if the build found it, else OpenCV
-  kOpenCv,      ///< OpenCV's dnn module
-  kOnnxRuntime  ///< ONNX Runtime, optional and faster
-};
-
 inline constexpr int kSegmenterMultiple = 32;  ///< pixels; both sides of its input are multiples of this
 
 struct ROSLAM_EXPORT SegmenterOptions {
   int working_side = 416;  ///< pixels, longer side of the network's input; less is faster, more is finer
+  int threads = 1;         ///< of the own engine for one image, 1 to 4
 
   /// Throws OptionsError naming the field.
   void validate() const;

@@ -38,7 +38,7 @@ void PacedReader::read(const std::stop_token& stop) {
       std::unique_lock lock(mutex_);
       tick_.wait_until(lock, stop, due, [] { return false; });
       if (stop.stop_requested()) break;
-      dropped_ += queue_.push(std::move(*frame));
+      queue_.push(std::move(*frame));
     }
   } catch (...) {
     failure_ = std::current_exception();

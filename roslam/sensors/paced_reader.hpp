@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -10,16 +9,17 @@
 #include <optional>
 #include <thread>
 
-#include "roslam/common/bounded_queue.hpp"
+#include "roslam/sensors/frame_queue.hpp"
 #include "roslam/sensors/frame_source.hpp"
 
 namespace roslam {
 
 /// Reads a recorded source on a thread of its own and hands out frames at the pace of their timestamps, as a
-/// camera would. Frames that nobody takes in time are dropped and counted, the oldest first.
+/// camera would. Frames that nobody takes in time are dropped and counted (FrameQueue).
 class PacedReader {
  public:
-  /// source must outlive the reader and is used by nobody else meanwhile. queue_size: frames that may wait.
+  /// source must outlive the reader and is used by nobody else meanwhile. queue_size: frames that may wait
+  /// without any being dropped.
   PacedReader(FrameSource& source, std::size_t queue_size);
   ~PacedReader() { stop(); }
   PacedReader(const PacedReader&) = delete;
@@ -33,17 +33,19 @@ class PacedReader {
   /// thread.
   void stop();
 
-  std::size_t dropped() const { return dropped_; }
+  std::size_t dropped() const { return queue_.dropped(); }
+
+  /// The most frames dropped in a row.
+  std::size_t longest_gap() const { return queue_.longest_gap(); }
 
  private:
   void read(const std::stop_token& stop);
   static std::chrono::steady_clock::duration pause(double from, double to);
 
   FrameSource& source_;
-  BoundedQueue<Frame> queue_;
+  FrameQueue queue_;
   std::mutex mutex_;
   std::condition_variable_any tick_;
-  std::atomic<std::size_t> dropped_ = 0;
   std::exception_ptr failure_;  // written before the queue closes, read after
   std::jthread thread_;         // last, so that it stops before the members it uses are destroyed
 };

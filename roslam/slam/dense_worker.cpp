@@ -40,7 +40,7 @@ struct DenseWorker::Impl {
     cv::Vec3b colour;
   };
 
-  Impl(const Camera& camera, const Options& options, Mode the_mode, PoseLookup lookup);
+  Impl(const Camera& camera, const Options& options, Mode the_mode, PoseLookup lookup, LoadControl* load);
   void queue(KeyframeId keyframe, Job job);
   void work(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   void fuse(KeyframeId keyframe, const Job& job);
@@ -54,6 +54,7 @@ struct DenseWorker::Impl {
   int margin_;  // pixels
   Mode mode_;
   PoseLookup pose_lookup_;
+  LoadControl* load_;
   DepthKeyframeReducer reducer_;
 
   // Used by the worker's thread.
@@ -70,19 +71,22 @@ struct DenseWorker::Impl {
   KeyframeWorker worker_;  // last, so that its thread stops before the members it uses are destroyed
 };
 
-DenseWorker::Impl::Impl(const Camera& camera, const Options& options, Mode the_mode, PoseLookup lookup)
+DenseWorker::Impl::Impl(const Camera& camera, const Options& options, Mode the_mode, PoseLookup lookup,
+                        LoadControl* load)
     : options_(options.dense),
       depth_(options.depth),
       margin_(options.restoration.margin),
       mode_(the_mode),
       pose_lookup_(std::move(lookup)),
+      load_(load),
       reducer_(camera, options.dense, options.depth),
       mapper_(options.dense, options.noise),
       jobs_(options.dense.queue),
       worker_([this](auto&&... job) { work(job...); }, the_mode, 1, KeyframeWorker::OnFailure::kSwitchOff) {}
 
-DenseWorker::DenseWorker(const Camera& camera, const Options& options, Mode mode, PoseLookup pose_lookup)
-    : impl_(std::make_unique<Impl>(camera, options, mode, std::move(pose_lookup))) {}
+DenseWorker::DenseWorker(const Camera& camera, const Options& options, Mode mode, PoseLookup pose_lookup,
+                         LoadControl* load)
+    : impl_(std::make_unique<Impl>(camera, options, mode, std::move(pose_lookup), load)) {}
 
 DenseWorker::~DenseWorker() = default;
 
@@ -113,6 +117,7 @@ void DenseWorker::Impl::queue(KeyframeId keyframe, Job job) {
 void DenseWorker::Impl::work(KeyframeId keyframe, const KeyframeWorker::ShouldStop& /*should_stop*/,
                              StageTimes& times) {
   if (mode_ == Mode::kRealTime) lower_thread_priority();
+  if (load_ != nullptr) load_->wait_while(LoadMeasure::kDenseMapWaits);
   const auto job = jobs_.take(keyframe);
   if (!job) return;  // dropped
   try {

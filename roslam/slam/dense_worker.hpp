@@ -11,9 +11,10 @@
 #include "roslam/dynamic_objects/dynamic_objects.hpp"
 #include "roslam/map/ids.hpp"
 #include "roslam/map/keyframe_pose.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/restoration/restored_image.hpp"
 #include "roslam/sensors/frame_source.hpp"
-#include "roslam/slam/options.hpp"
+#include "roslam/slam/load_control.hpp"
 
 namespace roslam {
 
@@ -31,9 +32,11 @@ struct DenseInput {
 /// waits, and a failure costs a keyframe and nothing else. In deterministic mode each is fused at once.
 class DenseWorker {
  public:
-  /// pose_lookup: called on the worker's thread. Throws CalibrationError, OptionsError, or OptionsError
-  /// naming the component where the library was built without it.
-  DenseWorker(const Camera& camera, const Options& options, Mode mode, PoseLookup pose_lookup);
+  /// pose_lookup: called on the worker's thread. load: null, or what may make it wait. Throws
+  /// CalibrationError, OptionsError, or OptionsError naming the component where the library was built without
+  /// it.
+  DenseWorker(const Camera& camera, const Options& options, Mode mode, PoseLookup pose_lookup,
+              LoadControl* load = nullptr);
   ~DenseWorker();
 
   void submit(KeyframeId keyframe, DenseInput input);

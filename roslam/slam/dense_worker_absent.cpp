@@ -7,7 +7,7 @@ namespace roslam {
 
 struct DenseWorker::Impl {};
 
-DenseWorker::DenseWorker(const Camera&, const Options&, Mode, PoseLookup) {
+DenseWorker::DenseWorker(const Camera&, const Options&, Mode, PoseLookup, LoadControl*) {
   throw OptionsError(
       "dense.enabled: this library was built without the dense map (ROSLAM_DENSE); use --no-dense");
 }

@@ -11,10 +11,11 @@
 namespace roslam {
 
 FrontEnd::FrontEnd(const Camera& camera, const Options& options, Mode mode,
-                   std::shared_ptr<Segmenter> segmenter)
+                   std::shared_ptr<Segmenter> segmenter, const LoadControl& load)
     : camera_(camera),
       options_(options),
       mode_(mode),
+      load_(load),
       depth_check_(camera.fx),
       segmentation_(options.dynamic_objects.labels ? std::move(segmenter) : nullptr, mode, options.threads),
       detector_(camera, detector_settings(options)),
@@ -72,9 +73,12 @@ void FrontEnd::check_input(const Frame& frame, const cv::Mat& grey, FrontEndResu
 
 DynamicObjects FrontEnd::detect(const Frame& frame, const cv::Mat& grey,
                                 const std::optional<SE3>& predicted_T_camera_world, std::size_t frame_count) {
-  const auto every = static_cast<std::size_t>(options_.dynamic_objects.label_every);
-  if (mode_ == Mode::kRealTime || frame_count % every == 0)
-    segmentation_.offer(frame.index, brightness_.apply(frame.colour));
+  auto every = static_cast<std::size_t>(options_.dynamic_objects.label_every);
+  if (mode_ == Mode::kRealTime)
+    every = load_.is_taken(LoadMeasure::kLabelsEveryThird)    ? 3
+            : load_.is_taken(LoadMeasure::kLabelsEverySecond) ? 2
+                                                              : 1;
+  if (frame_count % every == 0) segmentation_.offer(frame.index, brightness_.apply(frame.colour));
   const auto labels = segmentation_.take();
   DynamicObjects objects = detector_.detect(frame, grey, predicted_T_camera_world, labels);
   // Labels that the detector rejected are not for the dense map either.

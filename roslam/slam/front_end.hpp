@@ -15,9 +15,10 @@
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/map/map.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/sensors/depth_check.hpp"
 #include "roslam/sensors/frame_source.hpp"
-#include "roslam/slam/options.hpp"
+#include "roslam/slam/load_control.hpp"
 #include "roslam/slam/segmentation_worker.hpp"
 #include "roslam/tracking/tracker.hpp"
 
@@ -42,8 +43,9 @@ struct FrontEndResult {
 /// thread only.
 class FrontEnd {
  public:
-  /// segmenter: null, or what labels frames.
-  FrontEnd(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter);
+  /// segmenter: null, or what labels frames. load must outlive this.
+  FrontEnd(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,
+           const LoadControl& load);
 
   /// True if dynamic objects are detected at all.
   bool detects() const;
@@ -90,6 +92,7 @@ class FrontEnd {
   Camera camera_;
   Options options_;
   Mode mode_;
+  const LoadControl& load_;
   BrightnessNormaliser brightness_;
   DepthCheck depth_check_;
   std::set<std::string> warned_;  // warnings that were handed out

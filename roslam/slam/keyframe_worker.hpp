@@ -14,7 +14,7 @@
 
 #include "roslam/common/stage_times.hpp"
 #include "roslam/map/ids.hpp"
-#include "roslam/slam/mode.hpp"
+#include "roslam/options/mode.hpp"
 
 namespace roslam {
 

@@ -21,7 +21,11 @@ using Note = std::function<void(const std::string&)>;
 std::shared_ptr<Segmenter> segmenter_of(const SlamSetup& setup, Options& options, const Note& note) {
   if (!options.dynamic_objects.labels) return nullptr;
   const auto file = setup.segmentation_model.empty() ? find_segmentation_model() : setup.segmentation_model;
-  if (!file.empty()) return std::make_shared<PspnetSegmenter>(file, options.segmenter);
+  if (!file.empty()) {
+    auto segmenter = std::make_shared<PspnetSegmenter>(file, options.segmenter, setup.backend);
+    if (!segmenter->note().empty()) note(segmenter->note());
+    return segmenter;
+  }
   options.dynamic_objects.labels = false;
   note(std::string(missing_segmentation_model().what()) +
        (options.dynamic_objects.is_on() ? "; dynamic objects are found by geometry alone"
@@ -44,7 +48,8 @@ std::shared_ptr<const Vocabulary> vocabulary_of(const SlamSetup& setup, Options&
 
 // Null where no network is: holes are then filled by diffusion.
 std::shared_ptr<Inpainter> inpainter_of(const SlamSetup& setup, const Note& note) {
-  auto inpainter = open_inpainter(setup.restoration_models);
+  auto inpainter = open_inpainter(setup.restoration_models, setup.backend);
+  if (inpainter && !inpainter->note().empty()) note(inpainter->note());
   if (inpainter == nullptr)
     note(
         "models/roslam-restorer-*.onnx: not found beside the program; what no frame shows is filled by "

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "roslam/common/export.hpp"
+#include "roslam/inference/inference.hpp"
 #include "roslam/slam/slam.hpp"
 
 namespace roslam {
@@ -14,10 +15,11 @@ namespace roslam {
 /// What open_slam() opens beside the options. Empty names stand for the files that come with RO-SLAM
 /// (find_resource()).
 struct ROSLAM_EXPORT SlamSetup {
-  std::filesystem::path segmentation_model;  ///< ONNX file of the network that labels pixels
-  std::filesystem::path restoration_models;  ///< folder of the inpainting networks
-  std::filesystem::path vocabulary;          ///< of ORB words, for place recognition
-  std::filesystem::path map;                 ///< map.roslam of an earlier session to continue; empty: none
+  std::filesystem::path segmentation_model;                 ///< ONNX file of the network that labels pixels
+  std::filesystem::path restoration_models;                 ///< folder of the inpainting networks
+  std::filesystem::path vocabulary;                         ///< of ORB words, for place recognition
+  InferenceBackend backend = InferenceBackend::kAutomatic;  ///< what runs the networks
+  std::filesystem::path map;       ///< map.roslam of an earlier session to continue; empty: none
   bool restore_keyframes = false;  ///< restore keyframes even where no dense map needs them restored
   OnRestored on_restored = {};     ///< takes restored keyframes; may be empty
 

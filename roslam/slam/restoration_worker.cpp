@@ -12,7 +12,7 @@ namespace roslam {
 
 RestorationWorker::RestorationWorker(const Camera& camera, const Options& options, Mode mode,
                                      std::shared_ptr<Inpainter> inpainter, PoseLookup keyframe_poses,
-                                     OnRestored on_restored, OnLeft on_left)
+                                     OnRestored on_restored, OnLeft on_left, LoadControl* load)
     : options_(options.restoration),
       mode_(mode),
       most_sources_(sources_that_fit(options.restoration.recent_sources, camera)),
@@ -20,6 +20,7 @@ RestorationWorker::RestorationWorker(const Camera& camera, const Options& option
       pose_lookup_(std::move(keyframe_poses)),
       on_restored_(std::move(on_restored)),
       on_left_(std::move(on_left)),
+      load_(load),
       jobs_(options_.queue),
       worker_([this](KeyframeId keyframe, const auto&, StageTimes& times) { work(keyframe, times); }, mode, 1,
               KeyframeWorker::OnFailure::kSwitchOff) {}
@@ -36,6 +37,7 @@ void RestorationWorker::leave(KeyframeId keyframe) const {
 
 void RestorationWorker::work(KeyframeId keyframe, StageTimes& times) {
   if (mode_ == Mode::kRealTime) lower_thread_priority();
+  if (load_ != nullptr) load_->wait_while(LoadMeasure::kRestorationWaits);
   const auto job = jobs_.take(keyframe);
   if (!job) return;  // dropped
   try {

@@ -12,11 +12,12 @@
 #include "roslam/dynamic_objects/dynamic_object_detector.hpp"
 #include "roslam/map/ids.hpp"
 #include "roslam/map/keyframe_pose.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/restoration/static_scene_restorer.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/slam/keyframe_jobs.hpp"
 #include "roslam/slam/keyframe_worker.hpp"
-#include "roslam/slam/options.hpp"
+#include "roslam/slam/load_control.hpp"
 #include "roslam/slam/restored_keyframe.hpp"
 
 namespace roslam {
@@ -30,11 +31,11 @@ class RestorationWorker {
   /// throw.
   using OnLeft = std::function<void(KeyframeId)>;
 
-  /// inpainter: as StaticSceneRestorer. keyframe_poses: called on the worker's thread. Throws as
-  /// StaticSceneRestorer does.
+  /// inpainter: as StaticSceneRestorer. keyframe_poses: called on the worker's thread. load: null, or what
+  /// may make it wait. Throws as StaticSceneRestorer does.
   RestorationWorker(const Camera& camera, const Options& options, Mode mode,
                     std::shared_ptr<Inpainter> inpainter, PoseLookup keyframe_poses, OnRestored on_restored,
-                    OnLeft on_left = {});
+                    OnLeft on_left = {}, LoadControl* load = nullptr);
 
   /// The images of the frame must not be changed afterwards.
   void submit(KeyframeId keyframe, const Frame& frame, const DynamicObjects& dynamic_objects);
@@ -75,6 +76,7 @@ class RestorationWorker {
   PoseLookup pose_lookup_;
   OnRestored on_restored_;
   OnLeft on_left_;
+  LoadControl* load_;
   std::map<KeyframeId, SourceImage> sources_;  // by the worker's thread
 
   KeyframeJobs<Job> jobs_;

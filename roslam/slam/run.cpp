@@ -35,6 +35,7 @@ class Runner {
     while (!stop.stop_requested()) {
       const auto frame = reader.next();
       summary_.dropped = reader.dropped();
+      summary_.longest_gap = reader.longest_gap();
       if (!frame) break;
       process(*frame);
     }

@@ -10,8 +10,8 @@
 
 #include "roslam/common/stage_times.hpp"
 #include "roslam/dynamic_objects/dynamic_object_detector.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/semantics/segmenter.hpp"
-#include "roslam/slam/options.hpp"
 
 namespace roslam {
 

@@ -4,8 +4,8 @@
 #include "roslam/dynamic_objects/dynamic_object_detector.hpp"
 #include "roslam/loop_closing/loop_closer.hpp"
 #include "roslam/mapping/local_mapper.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/restoration/static_scene_restorer.hpp"
-#include "roslam/slam/options.hpp"
 #include "roslam/tracking/tracker.hpp"
 
 namespace roslam {

@@ -11,7 +11,9 @@ namespace roslam {
 
 Slam::Slam(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,
            std::shared_ptr<const Vocabulary> vocabulary)
-    : impl_(std::make_unique<Impl>(camera, options, mode, std::move(segmenter), std::move(vocabulary))) {}
+    : impl_(std::make_unique<Impl>(camera, options, mode, segmenter, std::move(vocabulary))) {
+  if (segmenter) impl_->backends["segmentation"] = segmenter->backend();
+}
 
 Slam::~Slam() { impl_->cancel(); }
 
@@ -25,12 +27,14 @@ void Slam::load_map(SavedMap saved) {
 
 void Slam::enable_dense_mapping() {
   Impl& impl = *impl_;
-  impl.dense.emplace(impl.camera, impl.options, impl.mode,
-                     [&impl](const auto& keyframes) { return impl.poses.find(keyframes); });
+  impl.dense.emplace(
+      impl.camera, impl.options, impl.mode,
+      [&impl](const auto& keyframes) { return impl.poses.find(keyframes); }, &impl.load);
 }
 
 void Slam::enable_restoration(std::shared_ptr<Inpainter> inpainter, OnRestored on_restored) {
   Impl& impl = *impl_;
+  if (inpainter) impl.backends["inpainting"] = inpainter->backend();
   const auto hand_to_dense = [&impl](KeyframeId keyframe, const RestoredImage* image) {
     if (impl.dense) impl.dense->restored(keyframe, image);
   };
@@ -41,7 +45,7 @@ void Slam::enable_restoration(std::shared_ptr<Inpainter> inpainter, OnRestored o
         hand_to_dense(restored.keyframe, &restored.view);
         if (on_restored) on_restored(restored);
       },
-      [hand_to_dense](KeyframeId keyframe) { hand_to_dense(keyframe, nullptr); });
+      [hand_to_dense](KeyframeId keyframe) { hand_to_dense(keyframe, nullptr); }, &impl.load);
 }
 
 FrameResult Slam::process(const Frame& frame, const cv::Mat& mask) { return impl_->process(frame, mask); }
@@ -117,6 +121,10 @@ std::map<std::string, std::size_t> Slam::restoration_faults() const {
 }
 
 std::map<std::string, std::size_t> Slam::labelling_faults() const { return impl_->front_end.faults(); }
+
+std::map<std::string, std::size_t> Slam::gave_way() const { return impl_->load.frames(); }
+
+std::map<std::string, std::string> Slam::backends() const { return impl_->backends; }
 
 std::map<std::string, std::size_t> Slam::warnings() const { return impl_->front_end.warnings(); }
 

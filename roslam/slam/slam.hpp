@@ -18,11 +18,11 @@
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/loop_closing/closed_loop.hpp"
 #include "roslam/map_io/saved_map.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/restoration/inpainter.hpp"
 #include "roslam/semantics/segmenter.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/slam/frame_result.hpp"
-#include "roslam/slam/options.hpp"
 #include "roslam/slam/restored_keyframe.hpp"
 
 namespace roslam {
@@ -115,6 +115,12 @@ class ROSLAM_EXPORT Slam {
 
   /// What failed in labelling so far, by message.
   std::map<std::string, std::size_t> labelling_faults() const;
+
+  /// What gave way to tracking in real-time mode, in words, and in how many frames.
+  std::map<std::string, std::size_t> gave_way() const;
+
+  /// What runs each network: segmentation and inpainting, such as "own (AVX2)".
+  std::map<std::string, std::string> backends() const;
 
   /// What is doubtful about the input so far, in words with the remedy, and in how many frames: dark images,
   /// depth that does not belong to the colour images or is of an implausible scale, a calibration of another

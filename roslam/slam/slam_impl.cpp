@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/slam/slam_impl.hpp"
 
+#include <chrono>
 #include <exception>
 #include <mutex>
 #include <utility>
@@ -41,7 +42,8 @@ Slam::Impl::Impl(const Camera& the_camera, const Options& the_options, Mode the_
       options(validated(the_options)),
       mode(the_mode),
       gate(camera),
-      front_end(camera, options, mode, std::move(segmenter)),
+      load(mode, camera.fps),
+      front_end(camera, options, mode, std::move(segmenter), load),
       map(front_end.level_scales()),
       tracker(camera, map, settings_of_tracker(options, vocabulary != nullptr)),
       keyframe_policy(options.keyframes),
@@ -69,6 +71,7 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
     return result;
   }
   const Stopwatch watch;
+  const auto begun = std::chrono::steady_clock::now();
   result.is_clock_reset = verdict.is_clock_reset;
   if (verdict.is_clock_reset) restart_clock(frame.timestamp);
   FrontEndResult observation = front_end.observe(frame, mask, predict_pose(frame.timestamp), log.frames());
@@ -91,6 +94,7 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   map_lock.unlock();
 
   result.tracking_seconds = watch.seconds();
+  load.note_frame(std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count());
   note_times(observation, result.tracking_seconds);
   result.state = tracked.state;
   result.inliers = tracked.inliers;
@@ -219,6 +223,7 @@ void Slam::Impl::note_times(const FrontEndResult& observation, double total) {
 }
 
 void Slam::Impl::finish() {
+  load.release();
   // All, whatever the first throws: no thread may change the map when results are read.
   std::exception_ptr failure;
   const auto drain = [&](auto& worker) {
@@ -236,6 +241,7 @@ void Slam::Impl::finish() {
 }
 
 void Slam::Impl::cancel() {
+  load.release();
   front_end.cancel();
   mapping.cancel();
   closing.cancel();

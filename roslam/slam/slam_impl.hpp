@@ -15,6 +15,7 @@
 #include "roslam/slam/frame_gate.hpp"
 #include "roslam/slam/front_end.hpp"
 #include "roslam/slam/keyframe_worker.hpp"
+#include "roslam/slam/load_control.hpp"
 #include "roslam/slam/restoration_worker.hpp"
 #include "roslam/slam/slam.hpp"
 #include "roslam/slam/trajectory_log.hpp"
@@ -27,6 +28,8 @@ namespace roslam {
 struct Slam::Impl {
   Impl(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,
        std::shared_ptr<const Vocabulary> vocabulary);
+
+  ~Impl() { load.release(); }  // or threads that wait would never end
 
   FrameResult process(const Frame& frame, const cv::Mat& mask);
   void finish();
@@ -48,6 +51,7 @@ struct Slam::Impl {
   Options options;
   Mode mode;
   FrameGate gate;
+  LoadControl load;
   FrontEnd front_end;
   MapMutex map_mutex;
   Map map;
@@ -59,6 +63,7 @@ struct Slam::Impl {
   std::optional<LoopCloser> loop_closer;
   TrajectoryLog log;
   StageTimes times;
+  std::map<std::string, std::string> backends;  // what runs each network
   // Last, so that their threads stop before the members they use are destroyed.
   std::optional<DenseWorker> dense;
   std::optional<RestorationWorker> restoration;

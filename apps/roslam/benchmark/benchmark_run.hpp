@@ -11,7 +11,7 @@
 #include "apps/roslam/benchmark/benchmark_sequences.hpp"
 #include "evaluation/trajectory_error.hpp"
 #include "roslam/common/stage_times.hpp"
-#include "roslam/slam/options.hpp"
+#include "roslam/options/options.hpp"
 
 namespace roslam::app {
 

@@ -14,8 +14,8 @@
 #include "roslam/common/error.hpp"
 #include "roslam/common/write_file.hpp"
 #include "roslam/dense/surface_file.hpp"
+#include "roslam/options/options.hpp"
 #include "roslam/sensors/image_file.hpp"
-#include "roslam/slam/options.hpp"
 
 namespace roslam::app {
 

@@ -12,16 +12,16 @@
 #include "roslam/loop_closing/loop_closing_options.hpp"
 #include "roslam/mapping/mapping_options.hpp"
 #include "roslam/matching/matcher_options.hpp"
+#include "roslam/options/mode.hpp"
 #include "roslam/place_recognition/geometric_verifier_options.hpp"
 #include "roslam/restoration/restoration_options.hpp"
 #include "roslam/semantics/segmenter_options.hpp"
-#include "roslam/slam/mode.hpp"
 #include "roslam/tracking/tracking_options.hpp"
 
 namespace roslam {
 
 struct ROSLAM_EXPORT ThreadOptions {
-  int frame_queue = 2;     ///< frames that may wait for the tracker in real-time mode; older ones are dropped
+  int frame_queue = 2;     ///< frames that may wait for the tracker in real-time mode before one is dropped
   int keyframe_queue = 3;  ///< keyframes that may wait for the mapper in real-time mode
   double segmentation_timeout = 10.0;  ///< seconds a network may take for a frame before it is given up
 

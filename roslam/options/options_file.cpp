@@ -11,7 +11,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/yaml_file.hpp"
-#include "roslam/slam/options_fields.hpp"
+#include "roslam/options/options_fields.hpp"
 
 namespace roslam {
 

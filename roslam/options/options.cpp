@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/slam/options.hpp"
+#include "roslam/options/options.hpp"
 
 #include "roslam/common/error.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "roslam/slam/options.hpp"
+#include "roslam/options/options.hpp"
 
 namespace roslam {
 

@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/semantics/inference.hpp"
-
-#include <fstream>
-#include <iterator>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/dnn.hpp>
-#include <system_error>
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/out_of_memory.hpp"
+#include "roslam/inference/inference.hpp"
 
 namespace roslam {
 
 namespace {
-constexpr std::uintmax_t kLargestModel = 256U << 20U;             // bytes; the one supplied has a few MB
 constexpr const char* kRemedy = "choose a smaller working side";  // if memory runs out
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
@@ -36,25 +32,12 @@ class OpenCvInference : public Inference {
     }
   }
 
+  std::string backend() const override { return "opencv " + cv::getVersionString(); }
+
  private:
   cv::dnn::Net net_;
   std::filesystem::path model_;
 };
-
-std::string read_model(const std::filesystem::path& model) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(model, error)) {
-    throw ModelError(model.string() + ": no such model file; expected the weights as an ONNX file");
-  }
-  if (std::filesystem::file_size(model, error) > kLargestModel || error) {
-    throw ModelError(model.string() + ": larger than 256 MB; give an ONNX file made by training/");
-  }
-  std::ifstream in(model, std::ios::binary);
-  std::string bytes(std::istreambuf_iterator<char>(in), {});
-  if (!in && !in.eof()) throw ModelError(model.string() + ": cannot be read; check its permissions");
-  if (bytes.empty()) throw ModelError(model.string() + ": is empty; install the model again");
-  return bytes;
-}
 }  // namespace
 
 std::unique_ptr<Inference> load_opencv_inference(const std::string& bytes,
@@ -68,31 +51,6 @@ std::unique_ptr<Inference> load_opencv_inference(const std::string& bytes,
     throw ModelError(model.string() + ": is damaged or not an ONNX network that OpenCV can run (" +
                      first_line(error.err) + "); install the model again");
   }
-}
-
-#ifndef ROSLAM_WITH_ONNX_RUNTIME
-std::unique_ptr<Inference> load_onnx_runtime_inference(const std::string&,
-                                                       const std::filesystem::path& model) {
-  throw ModelError(model.string() +
-                   ": this build has no ONNX Runtime; build with it installed or use the opencv backend");
-}
-#endif
-
-bool has_onnx_runtime() {
-#ifdef ROSLAM_WITH_ONNX_RUNTIME
-  return true;
-#else
-  return false;
-#endif
-}
-
-std::unique_ptr<Inference> load_inference(const std::filesystem::path& model, InferenceBackend backend) {
-  const std::string bytes = read_model(model);
-  if (backend == InferenceBackend::kOnnxRuntime ||
-      (backend == InferenceBackend::kAutomatic && has_onnx_runtime())) {
-    return load_onnx_runtime_inference(bytes, model);
-  }
-  return load_opencv_inference(bytes, model);
 }
 
 }  // namespace roslam

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "roslam/common/error.hpp"
-#include "roslam/semantics/inference.hpp"
-#include "roslam/semantics/onnx_image_size.hpp"
+#include "roslam/inference/inference.hpp"
+#include "roslam/inference/plan/onnx_image_size.hpp"
 
 namespace roslam {
 
@@ -57,6 +57,10 @@ class OnnxRuntimeInference : public Inference {
       throw ModelError(model_.string() + ": the network cannot be run (" + error.what() +
                        "); install the model that belongs to this version");
     }
+  }
+
+  std::string backend() const override {
+    return "onnxruntime " + std::string(OrtGetApiBase()->GetVersionString());
   }
 
  private:

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/sensors/frame_queue.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace roslam {
+
+void FrameQueue::push(Frame frame) {
+  const std::scoped_lock lock(mutex_);
+  const std::size_t number = pushed_++;
+  if (closed_) {
+    ++dropped_;
+    return;
+  }
+  if (queue_.size() >= room_) {
+    std::deque<Waiting> kept;
+    for (std::size_t i = 0; i < queue_.size(); i += 2) kept.push_back(std::move(queue_[i]));
+    dropped_ += queue_.size() - kept.size();
+    queue_ = std::move(kept);
+  }
+  queue_.push_back({std::move(frame), number});
+  changed_.notify_one();
+}
+
+std::optional<Frame> FrameQueue::pop() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return closed_ || !queue_.empty(); });
+  if (queue_.empty()) return std::nullopt;
+  if (queue_.size() > relaxed_ && !closed_) {
+    queue_.pop_front();
+    ++dropped_;
+  }
+  Waiting next = std::move(queue_.front());
+  queue_.pop_front();
+  longest_gap_ = std::max(longest_gap_, next.number - expected_);
+  expected_ = next.number + 1;
+  return std::move(next.frame);
+}
+
+void FrameQueue::discard() {
+  const std::scoped_lock lock(mutex_);
+  queue_.clear();
+  closed_ = true;
+  changed_.notify_all();
+}
+
+void FrameQueue::close() {
+  const std::scoped_lock lock(mutex_);
+  closed_ = true;
+  changed_.notify_all();
+}
+
+std::size_t FrameQueue::dropped() const {
+  const std::scoped_lock lock(mutex_);
+  return dropped_;
+}
+
+std::size_t FrameQueue::longest_gap() const {
+  const std::scoped_lock lock(mutex_);
+  return longest_gap_;
+}
+
+}  // namespace roslam
