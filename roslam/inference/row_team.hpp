@@ -15,15 +15,8 @@ class RowTeam {
   /// Work on the rows begin..end by the thread of that number, from 0.
   using Work = std::function<void(int begin, int end, int thread)>;
 
-  explicit RowTeam(int threads) : size_(threads) {
-    for (int i = 1; i < threads; ++i) threads_.emplace_back([this, i] { serve(i); });
-  }
-
-  ~RowTeam() {
-    should_stop_ = true;
-    ++round_;
-    round_.notify_all();
-  }
+  explicit RowTeam(int threads) : size_(threads) {}
+  ~RowTeam() { stop(); }
   RowTeam(const RowTeam&) = delete;
   RowTeam& operator=(const RowTeam&) = delete;
 
@@ -32,6 +25,7 @@ class RowTeam {
   /// Does the work on 0..rows and returns when all of it is done. The work must not throw.
   void run(int rows, const Work& work) {
     if (size_ == 1 || rows < size_) return work(0, rows, 0);
+    if (threads_.empty()) start();
     work_ = &work;
     rows_ = rows;
     left_ = size_ - 1;
@@ -42,6 +36,23 @@ class RowTeam {
   }
 
  private:
+  // By the thread that uses the team, whose priority the new ones inherit.
+  void start() {
+    try {
+      for (int i = 1; i < size_; ++i) threads_.emplace_back([this, i] { serve(i); });
+    } catch (...) {
+      stop();
+      throw;
+    }
+  }
+
+  void stop() {
+    should_stop_ = true;
+    ++round_;
+    round_.notify_all();
+    threads_.clear();
+  }
+
   void serve(int thread) {
     std::uint64_t seen = 0;
     while (true) {

@@ -11,7 +11,7 @@
 namespace roslam {
 
 FrontEnd::FrontEnd(const Camera& camera, const Options& options, Mode mode,
-                   std::shared_ptr<Segmenter> segmenter, const LoadControl& load)
+                   std::shared_ptr<Segmenter> segmenter, const LoadControl* load)
     : camera_(camera),
       options_(options),
       mode_(mode),
@@ -74,10 +74,10 @@ void FrontEnd::check_input(const Frame& frame, const cv::Mat& grey, FrontEndResu
 DynamicObjects FrontEnd::detect(const Frame& frame, const cv::Mat& grey,
                                 const std::optional<SE3>& predicted_T_camera_world, std::size_t frame_count) {
   auto every = static_cast<std::size_t>(options_.dynamic_objects.label_every);
-  if (mode_ == Mode::kRealTime)
-    every = load_.is_taken(LoadMeasure::kLabelsEveryThird)    ? 3
-            : load_.is_taken(LoadMeasure::kLabelsEverySecond) ? 2
-                                                              : 1;
+  if (mode_ == Mode::kRealTime) {
+    const auto is_taken = [&](LoadMeasure measure) { return load_ != nullptr && load_->is_taken(measure); };
+    every = is_taken(LoadMeasure::kLabelsEveryThird) ? 3 : is_taken(LoadMeasure::kLabelsEverySecond) ? 2 : 1;
+  }
   if (frame_count % every == 0) segmentation_.offer(frame.index, brightness_.apply(frame.colour));
   const auto labels = segmentation_.take();
   DynamicObjects objects = detector_.detect(frame, grey, predicted_T_camera_world, labels);

@@ -43,9 +43,9 @@ struct FrontEndResult {
 /// thread only.
 class FrontEnd {
  public:
-  /// segmenter: null, or what labels frames. load must outlive this.
+  /// segmenter: null, or what labels frames. load: null, or what reduces the work.
   FrontEnd(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,
-           const LoadControl& load);
+           const LoadControl* load = nullptr);
 
   /// True if dynamic objects are detected at all.
   bool detects() const;
@@ -92,7 +92,7 @@ class FrontEnd {
   Camera camera_;
   Options options_;
   Mode mode_;
-  const LoadControl& load_;
+  const LoadControl* load_;
   BrightnessNormaliser brightness_;
   DepthCheck depth_check_;
   std::set<std::string> warned_;  // warnings that were handed out

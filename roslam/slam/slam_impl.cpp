@@ -43,7 +43,7 @@ Slam::Impl::Impl(const Camera& the_camera, const Options& the_options, Mode the_
       mode(the_mode),
       gate(camera),
       load(mode, camera.fps),
-      front_end(camera, options, mode, std::move(segmenter), load),
+      front_end(camera, options, mode, std::move(segmenter), &load),
       map(front_end.level_scales()),
       tracker(camera, map, settings_of_tracker(options, vocabulary != nullptr)),
       keyframe_policy(options.keyframes),
