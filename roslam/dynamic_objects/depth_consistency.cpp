@@ -122,11 +122,12 @@ void DepthConsistency::vote(const CellGrid& grid, const PackedCells& cells, cons
   }
 }
 
-// Votes on one cell of each block first. Where no frame saw through it or its neighbours, its votes hold for
-// the other cells of the block that lie on the same surface; elsewhere each cell is voted on.
+// Votes on one cell of each block first. Where its surface and those of the neighbouring blocks were seen and
+// never seen through, its votes hold for the other cells of the block that lie on the same surface; elsewhere
+// each cell is voted on.
 DepthConsistency::Votes DepthConsistency::votes_on(const CellGrid& grid, const cv::Mat& depth,
                                                    const SE3& T_camera_world, double timestamp) const {
-  constexpr int kBlock = 2;  // cells
+  constexpr int kBlock = 4;  // cells
   Votes votes(grid.size());
   const cv::Size blocks((depth.cols + kBlock - 1) / kBlock, (depth.rows + kBlock - 1) / kBlock);
   cv::Mat first(blocks, CV_32SC1, cv::Scalar(-1));
@@ -152,7 +153,7 @@ DepthConsistency::Votes DepthConsistency::votes_on(const CellGrid& grid, const c
   cv::Mat is_suspect = cv::Mat::zeros(blocks, CV_8UC1);
   for (int i = 0; i < blocks.area(); ++i) {
     const int cell = first.ptr<int>()[i];
-    if (cell >= 0) is_suspect.data[i] = votes.through.data[cell];
+    is_suspect.data[i] = cell >= 0 && (votes.through.data[cell] != 0 || votes.same.data[cell] == 0);
   }
   cv::dilate(is_suspect, is_suspect, cv::Mat());
   cells = {};

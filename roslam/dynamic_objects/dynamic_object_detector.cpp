@@ -310,7 +310,8 @@ void DynamicObjectDetector::remember(const std::optional<SE3>& T_camera_world,
                                      const std::vector<cv::Point2f>& removed_points) {
   current_.T_camera_world = T_camera_world;
   for (Corner& corner : current_.corners) {
-    corner.is_removed = !mask_.empty() && mask_.at<std::uint8_t>(cv::Point(corner.pixel)) != 0;
+    const cv::Point pixel(static_cast<int>(corner.pixel.x), static_cast<int>(corner.pixel.y));
+    corner.is_removed = !mask_.empty() && mask_.at<std::uint8_t>(pixel) != 0;
   }
   corners_.replenish(current_.corners, points, false);
   corners_.replenish(current_.corners, removed_points, true);

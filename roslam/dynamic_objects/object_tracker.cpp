@@ -91,7 +91,7 @@ std::vector<MovableObject> predicted_objects(const std::vector<MovableObject>& o
     }
     const auto motion =
         before.size() >= kMinFlowPoints ? similarity(before, after) : camera_motion(object, from, to, flow);
-    if (move(object, motion, to.pyramid[0].size())) result.push_back(std::move(object));
+    if (move(object, motion, to.pyramid.image)) result.push_back(std::move(object));
   }
   return result;
 }

@@ -5,14 +5,15 @@
 #include <cmath>
 #include <cstdint>
 #include <iterator>
+#include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <utility>
 
 namespace roslam {
 
 namespace {
-constexpr int kLevels = 2;          // above the full image, as the motion is predicted
-constexpr int kWindow = 13;         // pixels
+constexpr int kHalved = 480;        // columns of images from which on flow is computed at half the resolution
+constexpr int kLevels = 2;          // above the first
 constexpr float kMaxReturn = 1.0F;  // pixels; limit of the forward-backward error
 
 // Square blocks of the image, so many along a row, and which of them hold a corner.
@@ -35,16 +36,24 @@ class Blocks {
   cv::Size size_;
 };
 
+std::vector<cv::Point2f> scaled(std::vector<cv::Point2f> points, float factor) {
+  for (cv::Point2f& point : points) point *= factor;
+  return points;
+}
+
 // Moves the guesses to where the points are found, from that pyramid level on.
-std::vector<std::uint8_t> lucas_kanade(const std::vector<cv::Mat>& from, const std::vector<cv::Mat>& to,
+std::vector<std::uint8_t> lucas_kanade(const FlowPyramid& from, const FlowPyramid& to,
                                        const std::vector<cv::Point2f>& points,
                                        std::vector<cv::Point2f>& guess, int level) {
   std::vector<std::uint8_t> found;
   if (points.empty()) return found;
   const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 12, 0.03);
   constexpr double kMinEigenvalue = 1e-3;
-  cv::calcOpticalFlowPyrLK(from, to, points, guess, found, cv::noArray(), {kWindow, kWindow}, level, criteria,
+  guess = scaled(std::move(guess), 1.0F / from.scale);
+  cv::calcOpticalFlowPyrLK(from.levels, to.levels, scaled(points, 1.0F / from.scale), guess, found,
+                           cv::noArray(), {from.window, from.window}, level, criteria,
                            cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  guess = scaled(std::move(guess), to.scale);
   return found;
 }
 }  // namespace
@@ -60,19 +69,26 @@ std::vector<CornerMatch> common_corners(const PastFrame& from, const PastFrame& 
   return matches;
 }
 
-std::vector<cv::Mat> flow_pyramid(const cv::Mat& grey) {
-  std::vector<cv::Mat> pyramid;
-  cv::buildOpticalFlowPyramid(grey, pyramid, {kWindow, kWindow}, kLevels, true);
+FlowPyramid flow_pyramid(const cv::Mat& grey) {
+  FlowPyramid pyramid;
+  pyramid.image = grey.size();
+  cv::Mat first = grey;
+  // Flow is compared within more than a pixel, for which half the resolution of usual images suffices.
+  if (grey.cols >= kHalved) {
+    cv::pyrDown(grey, first);
+    pyramid.scale = 2.0F;
+    pyramid.window = 9;
+  }
+  cv::buildOpticalFlowPyramid(first, pyramid.levels, {pyramid.window, pyramid.window}, kLevels, true);
   return pyramid;
 }
 
-std::vector<std::optional<cv::Point2f>> track_points(const std::vector<cv::Mat>& from,
-                                                     const std::vector<cv::Mat>& to,
+std::vector<std::optional<cv::Point2f>> track_points(const FlowPyramid& from, const FlowPyramid& to,
                                                      const std::vector<cv::Point2f>& points,
                                                      const std::vector<cv::Point2f>& guess) {
   std::vector<cv::Point2f> forward = guess;
   const auto found = lucas_kanade(from, to, points, forward, kLevels);
-  const cv::Rect2f image(0.0F, 0.0F, static_cast<float>(to[0].cols), static_cast<float>(to[0].rows));
+  const cv::Rect2f image(0.0F, 0.0F, static_cast<float>(to.image.width), static_cast<float>(to.image.height));
   std::vector<std::optional<cv::Point2f>> result(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (found[i] != 0 && image.contains(forward[i])) result[i] = forward[i];
@@ -80,7 +96,7 @@ std::vector<std::optional<cv::Point2f>> track_points(const std::vector<cv::Mat>&
   return result;
 }
 
-std::vector<bool> are_tracked_back(const std::vector<cv::Mat>& from, const std::vector<cv::Mat>& to,
+std::vector<bool> are_tracked_back(const FlowPyramid& from, const FlowPyramid& to,
                                    const std::vector<CornerMatch>& matches) {
   std::vector<cv::Point2f> found;
   std::vector<cv::Point2f> backward;

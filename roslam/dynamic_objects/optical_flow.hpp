@@ -19,11 +19,19 @@ struct Corner {
   bool is_removed = false;      ///< inside the mask
 };
 
+/// The image pyramid that optical flow is computed on.
+struct FlowPyramid {
+  std::vector<cv::Mat> levels;  ///< for cv::calcOpticalFlowPyrLK
+  cv::Size image;               ///< size of the image, pixels
+  float scale = 1.0F;           ///< pixels of the image in one of the first level
+  int window = 13;              ///< pixels of a level around a corner that are compared
+};
+
 /// The data of a frame that later frames are compared with.
 struct PastFrame {
-  std::size_t index = 0;              ///< in the source
-  double timestamp = 0.0;             ///< seconds
-  std::vector<cv::Mat> pyramid;       ///< for track_points
+  std::size_t index = 0;   ///< in the source
+  double timestamp = 0.0;  ///< seconds
+  FlowPyramid pyramid;
   cv::Mat depth;                      ///< CV_32FC1 metres, 0 = unknown; may be empty
   std::optional<SE3> T_camera_world;  ///< by tracking; nothing if the pose is unknown
   std::vector<Corner> corners;        ///< those tracked from the frame before, and new ones
@@ -38,19 +46,18 @@ struct CornerMatch {
 /// The corners that two frames have in common, which is optical flow over any number of frames.
 std::vector<CornerMatch> common_corners(const PastFrame& from, const PastFrame& to);
 
-/// The image pyramid for track_points. grey: CV_8UC1.
-std::vector<cv::Mat> flow_pyramid(const cv::Mat& grey);
+/// grey: CV_8UC1.
+FlowPyramid flow_pyramid(const cv::Mat& grey);
 
 /// Tracks points from one pyramid to another (pyramidal Lucas-Kanade, Bouguet 2001). guess: where each is
 /// predicted. Points that are lost are empty.
-std::vector<std::optional<cv::Point2f>> track_points(const std::vector<cv::Mat>& from,
-                                                     const std::vector<cv::Mat>& to,
+std::vector<std::optional<cv::Point2f>> track_points(const FlowPyramid& from, const FlowPyramid& to,
                                                      const std::vector<cv::Point2f>& points,
                                                      const std::vector<cv::Point2f>& guess);
 
 /// Forward-backward check: whether each corner, tracked from one pyramid to another, is tracked back to where
 /// it was.
-std::vector<bool> are_tracked_back(const std::vector<cv::Mat>& from, const std::vector<cv::Mat>& to,
+std::vector<bool> are_tracked_back(const FlowPyramid& from, const FlowPyramid& to,
                                    const std::vector<CornerMatch>& matches);
 
 /// Chooses the corners that are tracked from a frame on: one for each small block of the image.

@@ -18,14 +18,16 @@ float depth_at(const cv::Mat& depth, const cv::Point2f& pixel, const DepthOption
   const float centre = depth.ptr<float>(y)[x];
   if (!is_known(centre)) return 0.0F;
   const auto tolerance = static_cast<float>(options.edge_ratio + options.edge_growth * centre) * centre;
-  bool is_edge = false;
-  for (int ny = std::max(0, y - 1); ny <= std::min(depth.rows - 1, y + 1); ++ny) {
-    const auto* row = depth.ptr<float>(ny);
-    for (int nx = std::max(0, x - 1); nx <= std::min(depth.cols - 1, x + 1); ++nx) {
-      is_edge |= is_known(row[nx]) && std::abs(row[nx] - centre) > tolerance;
-    }
+  const auto differs = [&](int ny, int nx) {
+    const float z = depth.ptr<float>(ny)[nx];
+    return is_known(z) && std::abs(z - centre) > tolerance;
+  };
+  const int left = std::max(0, x - 1);
+  const int right = std::min(depth.cols - 1, x + 1);
+  for (const int ny : {std::max(0, y - 1), y, std::min(depth.rows - 1, y + 1)}) {
+    if (differs(ny, left) || differs(ny, x) || differs(ny, right)) return 0.0F;
   }
-  return is_edge ? 0.0F : centre;
+  return centre;
 }
 
 void DepthOptions::validate() const {
