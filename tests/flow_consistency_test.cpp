@@ -155,6 +155,47 @@ TEST_F(Flow, SaysNothingOfTheCameraWhereTooFewPointsAgree) {
   EXPECT_FALSE(camera_pose(last, dark, SE3()));
 }
 
+TEST_F(Flow, ACornerTrackedOverSeveralFramesStaysWhereItIsInTheScene) {
+  PastFrame last = frame(room(), 0.0, {});
+  const PastFrame first = last;
+  SE3 pose;
+  for (int i = 1; i <= 4; ++i) {
+    pose = turned(0.4 * kDegree * i, {0.01 * i, 0.0, 0.01 * i});
+    PastFrame now = frame(room(), 0.033 * i, pose);
+    flow_.track(last, now);
+    last = now;
+  }
+  last.T_camera_world = pose;
+  const auto matches = common_corners(first, last);
+  EXPECT_GT(matches.size(), first.corners.size() / 2);
+  std::size_t near = 0;
+  for (const auto& [from, to] : matches) {
+    EXPECT_EQ(from->track, to->track);
+    const cv::Point2f error = to->pixel - flow_.expected(first, last, from->pixel);
+    near += std::hypot(error.x, error.y) < 1.0F ? 1 : 0;
+  }
+  EXPECT_GT(near, matches.size() * 9 / 10);
+}
+
+TEST(CornerSelection, CornersLieApartAndKeepTheirTracks) {
+  CornerSelection selection(small_camera());
+  std::vector<Corner> corners;
+  const std::vector<cv::Point2f> points{{10.0F, 10.0F}, {11.0F, 11.0F}, {100.0F, 50.0F}, {200.0F, 150.0F}};
+  selection.replenish(corners, points, false);
+  ASSERT_EQ(corners.size(), 3U) << "one of the two that are close together";
+  const auto before = corners;
+  selection.replenish(corners, points, false);
+  ASSERT_EQ(corners.size(), 3U) << "where one is tracked none is added";
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(corners[i].track, before[i].track);
+  corners[1].pixel = corners[0].pixel + cv::Point2f(0.5F, 0.5F);  // they came together
+  selection.replenish(corners, {}, false);
+  EXPECT_EQ(corners.size(), 2U);
+  selection.replenish(corners, {{50.0F, 50.0F}}, true);
+  ASSERT_EQ(corners.size(), 3U);
+  EXPECT_TRUE(corners.back().is_removed);
+  EXPECT_GT(corners.back().track, before.back().track);
+}
+
 TEST_F(Flow, OnePointThatMovesProvesNothing) {
   TrackedPoints followed;
   followed.moving = {{50.0F, 50.0F},                                        // alone
