@@ -179,5 +179,35 @@ TEST_F(FreeSpace, KeepsViewsAtTheIntervalAndForgetsOldOnes) {
   EXPECT_EQ(share_of(evidence, MotionEvidence::kStatic, cells_of({kWall, kBox}, 2)), 1.0);
 }
 
+// Most cells take over the votes of another one; each cell is voted on if its neighbours have another depth.
+TEST_F(FreeSpace, WhatMovesIsFoundCellByCell) {
+  watch({kWall});
+  for (const double width : {0.06, 0.1, 0.2}) {
+    for (const double x : {-0.4, -0.385, -0.37, 0.1}) {
+      const std::vector<Panel> panels{kWall, {x, -0.4, x + width, 0.4, 2.0}};
+      const cv::Mat shown = grid_.mask_cells(stage_.show(panels).shows(2)) & (cells(panels) > 0.0F);
+      const auto evidence = examine(panels);
+      const cv::Mat moving = evidence.state == static_cast<int>(MotionEvidence::kMoving);
+      EXPECT_EQ(cv::countNonZero(moving & ~shown), 0) << width << ' ' << x;
+      EXPECT_EQ(cv::countNonZero(inside(shown, 1) & ~moving), 0) << width << ' ' << x;
+    }
+  }
+}
+
+TEST(Cells, BoxesOfNumbersEncloseThem) {
+  cv::Mat numbers = cv::Mat::zeros(30, 40, CV_32SC1);
+  numbers(cv::Rect(3, 4, 5, 6)).setTo(1);
+  numbers(cv::Rect(20, 10, 20, 20)).setTo(3);
+  cv::Mat smaller;
+  numbers.convertTo(smaller, CV_16U);
+  for (const cv::Mat& image : {numbers, smaller}) {
+    const auto boxes = boxes_of_numbers(image, 3);
+    ASSERT_EQ(boxes.size(), 4U);
+    EXPECT_EQ(boxes[1], cv::Rect(3, 4, 5, 6));
+    EXPECT_TRUE(boxes[2].empty());
+    EXPECT_EQ(boxes[3], cv::Rect(20, 10, 20, 20));
+  }
+}
+
 }  // namespace
 }  // namespace roslam::scene

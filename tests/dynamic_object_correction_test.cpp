@@ -59,8 +59,8 @@ class Correction : public testing::Test {
     view_ = stage_.show(panels, pose * T_new_old_);
     frame.depth = view_.depth;
     DynamicObjects objects = detector_->detect(frame, view_.grey, pose, {});
-    auto past = stage_.past(view_, 0, 0.0, pose, objects.mask);
-    detector_->remember(pose, std::move(past.points), std::move(past.moving_points));
+    const auto points = stage_.grid_points(objects.mask);
+    detector_->remember(pose, points.outside, points.inside);
     return objects;
   }
 

@@ -44,8 +44,8 @@ class WholeRemoval : public testing::Test {
     frame.depth = view.depth;
     const SE3 pose = pose_at(frame.index);
     const DynamicObjects dynamic_objects = detector_->detect(frame, view.grey, pose, given);
-    auto past = stage_.past(view, 0, 0.0, pose, dynamic_objects.mask);
-    detector_->remember(pose, std::move(past.points), std::move(past.moving_points));
+    const auto points = stage_.grid_points(dynamic_objects.mask);
+    detector_->remember(pose, points.outside, points.inside);
     return dynamic_objects;
   }
 

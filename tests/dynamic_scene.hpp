@@ -117,16 +117,33 @@ class Stage {
     return view;
   }
 
-  /// The view as a past frame of the flow consistency check, with points on a regular grid; those in the mask
-  /// are on moving objects.
-  PastFrame past(const View& view, std::size_t index, double timestamp, const SE3& T_camera_world,
-                 const cv::Mat& mask = {}) const {
-    PastFrame frame{index, timestamp, flow_pyramid(view.grey), view.depth, T_camera_world, {}, {}};
+  /// Points on a regular grid, outside and inside a mask.
+  struct GridPoints {
+    std::vector<cv::Point2f> outside;
+    std::vector<cv::Point2f> inside;
+  };
+  GridPoints grid_points(const cv::Mat& mask = {}) const {
+    GridPoints points;
     constexpr int kApart = 8;  // pixels
     for (int y = kApart; y < camera_.height; y += kApart) {
       for (int x = kApart; x < camera_.width; x += kApart) {
-        const bool is_removed = !mask.empty() && mask.at<std::uint8_t>(y, x) != 0;
-        (is_removed ? frame.moving_points : frame.points).emplace_back(x, y);
+        const bool is_inside = !mask.empty() && mask.at<std::uint8_t>(y, x) != 0;
+        (is_inside ? points.inside : points.outside).emplace_back(x, y);
+      }
+    }
+    return points;
+  }
+
+  /// The view as a past frame of the flow consistency check, with corners at the grid points; those in the
+  /// mask are on moving objects.
+  PastFrame past(const View& view, std::size_t index, double timestamp, const SE3& T_camera_world,
+                 const cv::Mat& mask = {}) const {
+    PastFrame frame{index, timestamp, flow_pyramid(view.grey), view.depth, T_camera_world, {}};
+    const GridPoints points = grid_points(mask);
+    for (const auto* list : {&points.outside, &points.inside}) {
+      for (const auto& point : *list) {
+        frame.corners.push_back({static_cast<int>(frame.corners.size()), point,
+                                 camera_.undistort({point.x, point.y}), list == &points.inside});
       }
     }
     return frame;

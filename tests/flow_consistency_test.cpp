@@ -17,6 +17,20 @@ class Flow : public testing::Test {
     return stage_.past(stage_.show(panels, pose), 0, time, pose);
   }
 
+  // Tracks the corners of a past frame to another one, whose pose is known, and classifies them.
+  TrackedPoints follow(const PastFrame& past, PastFrame now) const {
+    const auto pose = now.T_camera_world;
+    flow_.track(past, now);
+    now.T_camera_world = pose;
+    return flow_.follow(past, now);
+  }
+
+  // The pose of a frame by the flow from the last one.
+  std::optional<SE3> camera_pose(const PastFrame& last, PastFrame now, const SE3& predicted) const {
+    now.T_camera_world = predicted;
+    return flow_.track(last, now);
+  }
+
   static std::size_t count_on(const std::vector<cv::Point2f>& points, const cv::Mat& area) {
     std::size_t count = 0;
     for (const auto& point : points) count += area.at<std::uint8_t>(cv::Point(point)) != 0 ? 1 : 0;
@@ -40,7 +54,7 @@ class Flow : public testing::Test {
 TEST_F(Flow, AtRestNothingMovesWhateverTheCameraDoes) {
   const std::vector<Panel> panels{kWall, kPatch};
   for (const SE3& pose : {SE3(), moved_, turned(-4.0 * kDegree), looking_from(0.0, 0.0, 0.15)}) {
-    const auto followed = flow_.follow(frame(panels, 0.0, {}), frame(panels, 0.13, pose));
+    const auto followed = follow(frame(panels, 0.0, {}), frame(panels, 0.13, pose));
     EXPECT_GT(followed.at_rest.size(), 150U);
     EXPECT_TRUE(flow_.in_company(followed).empty());
     EXPECT_LE(followed.moving.size(), followed.at_rest.size() / 50);
@@ -53,7 +67,7 @@ TEST_F(Flow, APatchThatMovesOnItsOwnIsFound) {
   const std::vector<Panel> before{kWall, kPatch};
   const std::vector<Panel> after{kWall, kPatch.shifted(0.08, 0.03)};  // 9 pixels
   const View view = stage_.show(after, moved_);
-  const auto followed = flow_.follow(frame(before, 0.0, {}), stage_.past(view, 4, 0.13, moved_));
+  const auto followed = follow(frame(before, 0.0, {}), stage_.past(view, 4, 0.13, moved_));
   const cv::Mat patch = inside(view.shows(2), 4);
   const std::size_t found = count_on(followed.moving, patch);
   EXPECT_GE(found, 10U);
@@ -68,9 +82,9 @@ TEST_F(Flow, PointsThatWereRemovedAreFollowedToo) {
   const std::vector<Panel> before{kWall, kPatch};
   const View first = stage_.show(before);
   const PastFrame past = stage_.past(first, 0, 0.0, SE3(), first.shows(2));
-  ASSERT_GT(past.moving_points.size(), 10U);
+  ASSERT_GT(stage_.grid_points(first.shows(2)).inside.size(), 10U);
   const View second = stage_.show(before, moved_);
-  const auto followed = flow_.follow(past, stage_.past(second, 4, 0.13, moved_));
+  const auto followed = follow(past, stage_.past(second, 4, 0.13, moved_));
   EXPECT_GT(count_on(followed.at_rest, second.shows(2)), 10U);
 }
 
@@ -80,7 +94,7 @@ TEST_F(Flow, WithoutDepthAPointMayLieAnywhereOnItsEpipolarLine) {
     const View view = stage_.show({kWall, kPatch.shifted(x, y)}, sideways);
     PastFrame past = frame({kWall, kPatch}, 0.0, {});
     past.depth.release();
-    const auto followed = flow_.follow(past, stage_.past(view, 4, 0.13, sideways));
+    const auto followed = follow(past, stage_.past(view, 4, 0.13, sideways));
     EXPECT_LE(count_on(followed.moving, far_from(view.shows(2))), 2U);
     return count_on(followed.moving, inside(view.shows(2), 4));
   };
@@ -92,10 +106,10 @@ TEST_F(Flow, WithoutPosesNothingIsSaid) {
   PastFrame past = frame({kWall}, 0.0, {});
   PastFrame now = frame({kWall}, 0.13, moved_);
   now.T_camera_world.reset();
-  EXPECT_TRUE(flow_.follow(past, now).at_rest.empty());
+  EXPECT_TRUE(follow(past, now).at_rest.empty());
   EXPECT_EQ(flow_.expected(past, now, {30.0F, 40.0F}), cv::Point2f(30.0F, 40.0F));
   past.T_camera_world.reset();
-  EXPECT_FALSE(flow_.camera_pose(past, now, moved_));
+  EXPECT_FALSE(camera_pose(past, now, moved_));
 }
 
 TEST_F(Flow, ExpectsAPointWhereItsDepthPutsIt) {
@@ -115,7 +129,7 @@ TEST_F(Flow, FindsHowTheCameraMoved) {
   const PastFrame last = frame(panels, 0.0, {});
   PastFrame now = frame(panels, 0.033, moved_);
   now.T_camera_world.reset();
-  const auto found = flow_.camera_pose(last, now, SE3());
+  const auto found = camera_pose(last, now, SE3());
   ASSERT_TRUE(found);
   const SE3 error = moved_.inverse() * *found;
   EXPECT_LT(error.translation().norm(), 0.002);
@@ -125,7 +139,7 @@ TEST_F(Flow, FindsHowTheCameraMoved) {
 TEST_F(Flow, FindsHowTheCameraMovedThoughAThingMovesToo) {
   const PastFrame last = frame(room({kPatch}), 0.0, {});
   const PastFrame now = frame(room({kPatch.shifted(0.06, -0.04)}), 0.033, moved_);
-  const auto found = flow_.camera_pose(last, now, SE3());
+  const auto found = camera_pose(last, now, SE3());
   ASSERT_TRUE(found);
   EXPECT_LT((moved_.inverse() * *found).translation().norm(), 0.01);
 }
@@ -133,12 +147,53 @@ TEST_F(Flow, FindsHowTheCameraMovedThoughAThingMovesToo) {
 TEST_F(Flow, SaysNothingOfTheCameraWhereTooFewPointsAgree) {
   const PastFrame last = frame({kWall}, 0.0, {});
   PastFrame few = last;
-  few.points.resize(15);
-  EXPECT_FALSE(flow_.camera_pose(few, frame({kWall}, 0.033, moved_), SE3()));
+  few.corners.resize(15);
+  EXPECT_FALSE(camera_pose(few, frame({kWall}, 0.033, moved_), SE3()));
   // The light goes out, so that no point can be tracked.
   PastFrame dark = frame({kWall}, 0.033, moved_);
   dark.pyramid = flow_pyramid(cv::Mat(240, 320, CV_8UC1, cv::Scalar(10)));
-  EXPECT_FALSE(flow_.camera_pose(last, dark, SE3()));
+  EXPECT_FALSE(camera_pose(last, dark, SE3()));
+}
+
+TEST_F(Flow, ACornerTrackedOverSeveralFramesStaysWhereItIsInTheScene) {
+  PastFrame last = frame(room(), 0.0, {});
+  const PastFrame first = last;
+  SE3 pose;
+  for (int i = 1; i <= 4; ++i) {
+    pose = turned(0.4 * kDegree * i, {0.01 * i, 0.0, 0.01 * i});
+    PastFrame now = frame(room(), 0.033 * i, pose);
+    flow_.track(last, now);
+    last = now;
+  }
+  last.T_camera_world = pose;
+  const auto matches = common_corners(first, last);
+  EXPECT_GT(matches.size(), first.corners.size() / 2);
+  std::size_t near = 0;
+  for (const auto& [from, to] : matches) {
+    EXPECT_EQ(from->track, to->track);
+    const cv::Point2f error = to->pixel - flow_.expected(first, last, from->pixel);
+    near += std::hypot(error.x, error.y) < 1.0F ? 1 : 0;
+  }
+  EXPECT_GT(near, matches.size() * 9 / 10);
+}
+
+TEST(CornerSelection, CornersLieApartAndKeepTheirTracks) {
+  CornerSelection selection(small_camera());
+  std::vector<Corner> corners;
+  const std::vector<cv::Point2f> points{{10.0F, 10.0F}, {11.0F, 11.0F}, {100.0F, 50.0F}, {200.0F, 150.0F}};
+  selection.replenish(corners, points, false);
+  ASSERT_EQ(corners.size(), 3U) << "one of the two that are close together";
+  const auto before = corners;
+  selection.replenish(corners, points, false);
+  ASSERT_EQ(corners.size(), 3U) << "where one is tracked none is added";
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(corners[i].track, before[i].track);
+  corners[1].pixel = corners[0].pixel + cv::Point2f(0.5F, 0.5F);  // they came together
+  selection.replenish(corners, {}, false);
+  EXPECT_EQ(corners.size(), 2U);
+  selection.replenish(corners, {{50.0F, 50.0F}}, true);
+  ASSERT_EQ(corners.size(), 3U);
+  EXPECT_TRUE(corners.back().is_removed);
+  EXPECT_GT(corners.back().track, before.back().track);
 }
 
 TEST_F(Flow, OnePointThatMovesProvesNothing) {

@@ -18,6 +18,12 @@ class Memory : public testing::Test {
     return result;
   }
 
+  // Tracks the corners of the last frame to the current one, and the objects with them.
+  void carry(const PastFrame& last, PastFrame now) {
+    flow_.track(last, now);
+    object_tracker_.carry(last, now, flow_);
+  }
+
   static cv::Mat drawn(const MovableObject& object) {
     cv::Mat image = cv::Mat::zeros(240, 320, CV_8UC1);
     draw_object(object, image);
@@ -51,7 +57,7 @@ TEST_F(Memory, ThingsKeepTheirNumbersWhileTheyMove) {
     const std::vector<Panel> panels{kWall, left.shifted(-0.02 * i), right.shifted(0.02 * i)};
     const View view = stage_.show(panels, pose);
     const PastFrame frame = stage_.past(view, static_cast<std::size_t>(i), kFrame * i, pose, view.panel > 1);
-    if (last) object_tracker_.carry(*last, frame, flow_);
+    if (last) carry(*last, frame);
     // The labels come in another order each time.
     std::vector<MovableObject> labelled{on(view.shows(2)), on(view.shows(3))};
     if (i % 2 == 1) std::swap(labelled[0], labelled[1]);
@@ -73,8 +79,7 @@ TEST_F(Memory, CarriesMasksWithTheThingsTheyBelongTo) {
   const View before = stage_.show({kWall, box});
   const View after = stage_.show({kWall, box.shifted(0.06, 0.03)}, pose);
   object_tracker_.update_labelled({on(before.shows(2))}, 0.0);
-  object_tracker_.carry(stage_.past(before, 0, 0.0, SE3(), before.shows(2)),
-                        stage_.past(after, 1, kFrame, pose), flow_);
+  carry(stage_.past(before, 0, 0.0, SE3(), before.shows(2)), stage_.past(after, 1, kFrame, pose));
   ASSERT_EQ(object_tracker_.objects().size(), 1U);
   EXPECT_LT(agreement(before.shows(2), after.shows(2)), 0.92);
   EXPECT_GT(agreement(drawn(object_tracker_.objects()[0]), after.shows(2)), 0.95);
@@ -86,9 +91,9 @@ TEST_F(Memory, CarriesWithTheCameraWhatHasTooFewPoints) {
   const View before = stage_.show({kWall, box});
   const View after = stage_.show({kWall, box}, pose);
   PastFrame from = stage_.past(before, 0, 0.0, SE3());
-  from.points.clear();
+  from.corners.clear();
   object_tracker_.update_labelled({on(before.shows(2))}, 0.0);
-  object_tracker_.carry(from, stage_.past(after, 1, kFrame, pose), flow_);
+  carry(from, stage_.past(after, 1, kFrame, pose));
   ASSERT_EQ(object_tracker_.objects().size(), 1U);
   EXPECT_LT(agreement(before.shows(2), after.shows(2)), 0.8);
   EXPECT_GT(agreement(drawn(object_tracker_.objects()[0]), after.shows(2)), 0.95);
@@ -97,14 +102,13 @@ TEST_F(Memory, CarriesWithTheCameraWhatHasTooFewPoints) {
 TEST_F(Memory, ForgetsWhatLeavesTheImage) {
   const View view = stage_.show({kWall});
   PastFrame from = stage_.past(view, 0, 0.0, SE3());
-  from.points.clear();
+  from.corners.clear();
   object_tracker_.update_labelled({boxed({290, 100, 30, 50}), boxed({100, 100, 40, 40})}, 0.0);
-  object_tracker_.carry(from, stage_.past(view, 1, kFrame, looking_from(-0.2, 0.0, 0.0)),
-                        flow_);  // 17 pixels
+  carry(from, stage_.past(view, 1, kFrame, looking_from(-0.2, 0.0, 0.0)));  // 17 pixels
   ASSERT_EQ(object_tracker_.objects().size(), 2U);
   EXPECT_EQ(object_tracker_.objects()[0].box.br().x, 320);
   EXPECT_NEAR(object_tracker_.objects()[0].box.width, 13, 1);
-  object_tracker_.carry(from, stage_.past(view, 2, 2 * kFrame, looking_from(-0.4, 0.0, 0.0)), flow_);
+  carry(from, stage_.past(view, 2, 2 * kFrame, looking_from(-0.4, 0.0, 0.0)));
   EXPECT_EQ(ids(), std::vector<int>{2});
 }
 

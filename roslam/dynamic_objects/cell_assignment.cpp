@@ -60,29 +60,50 @@ void assign_cells(CellScene& scene, const std::vector<MovableObject>& objects,
   }
 }
 
-cv::Mat owners_of_pixels(const CellScene& scene, const std::vector<MovableObject>& objects,
-                         const cv::Mat& depth, const CellGrid& grid, const DynamicObjectOptions& options) {
+PixelOwners owners_of_pixels(const CellScene& scene, const std::vector<MovableObject>& objects,
+                             const cv::Mat& depth, const CellGrid& grid,
+                             const DynamicObjectOptions& options) {
   cv::Mat cells;
   scene.owners.convertTo(cells, CV_16U);
-  cv::Mat owners = grid.in_pixels(cells);
+  // The network's masks have finer borders than cells.
+  const auto has_fine_mask = [&](const MovableObject& object) {
+    return object.is_confirmed && is_seen_repeatedly(object) &&
+           (is_fresh(object) || !options.depth_consistency);
+  };
+  cv::Rect owned = cv::boundingRect(scene.owners != 0);
+  for (const MovableObject& object : objects) {
+    if (has_fine_mask(object)) owned |= grid.cells_of(object.box);
+  }
+  if (owned.empty()) return {};
+  const int reach = options.edge_band / grid.side() + 1;  // cells
+  const cv::Rect around = widened(owned, reach) & cv::Rect({0, 0}, grid.size());
+  PixelOwners result{grid.pixels_of(around), grid.in_pixels(cells(around), around)};
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    // The network's masks have finer borders than cells.
-    if (!objects[i].is_confirmed || !is_seen_repeatedly(objects[i])) continue;
-    if (!is_fresh(objects[i]) && options.depth_consistency) continue;
-    cv::Mat box = owners(objects[i].box);
+    if (!has_fine_mask(objects[i])) continue;
+    cv::Mat box = result.owners(objects[i].box - result.area.tl());
     box.setTo(static_cast<int>(i) + 1, objects[i].mask & (box == 0));
   }
-  if (!options.refine) return owners;
+  if (!options.refine) return result;
   // Only masks with evidence of this frame may grow, or propagated ones would grow with every frame.
   cv::Mat near_seeds;
-  cv::dilate(scene.seeds, near_seeds, square(options.edge_band / grid.side() + 1));
+  cv::dilate(scene.seeds, near_seeds, square(reach));
   const cv::Mat barrier = scene.cells_that_are(MotionEvidence::kStatic) | (near_seeds == 0);
-  const cv::Mat mask = refine_mask(owners != 0, depth, scene.depth, barrier, grid, options.edge_band);
-  cv::Mat wider;
-  cv::dilate(owners, wider, square(options.edge_band));
-  wider.copyTo(owners, owners == 0);
-  owners.setTo(0, mask == 0);
-  return owners;
+  const cv::Mat mask =
+      refine_mask(result.owners != 0, depth, scene.depth, barrier, grid, options.edge_band, result.area.tl());
+  // What is added to the masks belongs to an object nearby.
+  cv::dilate(cells, cells, square(reach));
+  for (int y = 0; y < mask.rows; ++y) {
+    const auto* is_set = mask.ptr<std::uint8_t>(y);
+    const auto* nearby = cells.ptr<std::uint16_t>((result.area.y + y) / grid.side());
+    auto* owner = result.owners.ptr<std::uint16_t>(y);
+    for (int x = 0; x < mask.cols; ++x) {
+      if (is_set[x] == 0)
+        owner[x] = 0;
+      else if (owner[x] == 0)
+        owner[x] = nearby[(result.area.x + x) / grid.side()];
+    }
+  }
+  return result;
 }
 
 }  // namespace roslam

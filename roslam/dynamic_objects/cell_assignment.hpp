@@ -33,9 +33,14 @@ void assign_cells(CellScene& scene, const std::vector<MovableObject>& objects,
                   const std::vector<MovableObject>& propagated, const CellGrid& grid,
                   const DynamicObjectOptions& options);
 
-/// CV_16UC1 of the image's size: the owner of each pixel, numbered as in the scene, with borders
-/// refined by depth (CV_32FC1 of the image, metres).
-cv::Mat owners_of_pixels(const CellScene& scene, const std::vector<MovableObject>& objects,
-                         const cv::Mat& depth, const CellGrid& grid, const DynamicObjectOptions& options);
+/// The owners of the pixels of a part of the image, numbered as in the scene.
+struct PixelOwners {
+  cv::Rect area;   ///< pixels; without owner outside. Empty = no pixel has an owner
+  cv::Mat owners;  ///< CV_16UC1 of the area's size
+};
+
+/// The owner of each pixel, with borders refined by depth (CV_32FC1 of the image, metres).
+PixelOwners owners_of_pixels(const CellScene& scene, const std::vector<MovableObject>& objects,
+                             const cv::Mat& depth, const CellGrid& grid, const DynamicObjectOptions& options);
 
 }  // namespace roslam

@@ -2,12 +2,44 @@
 #include "roslam/dynamic_objects/cell_grid.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 namespace roslam {
 
 namespace {
 constexpr int kColumns = 160;  // of cells, about
+
+template <typename Number>
+void find_boxes(const cv::Mat& numbers, std::vector<cv::Rect>& boxes) {
+  struct Range {
+    cv::Point least{std::numeric_limits<int>::max(), std::numeric_limits<int>::max()};
+    cv::Point largest{-1, -1};
+  };
+  std::vector<Range> ranges(boxes.size());
+  for (int y = 0; y < numbers.rows; ++y) {
+    const auto* row = numbers.ptr<Number>(y);
+    for (int x = 0; x < numbers.cols;) {
+      const Number number = row[x];
+      const int begin = x;
+      while (++x < numbers.cols && row[x] == number) continue;
+      if (number == 0) continue;
+      Range& range = ranges[static_cast<std::size_t>(number)];
+      range.least = {std::min(range.least.x, begin), std::min(range.least.y, y)};
+      range.largest = {std::max(range.largest.x, x - 1), y};
+    }
+  }
+  for (std::size_t i = 1; i < boxes.size(); ++i) {
+    if (ranges[i].largest.x >= 0) boxes[i] = {ranges[i].least, ranges[i].largest + cv::Point(1, 1)};
+  }
+}
+}  // namespace
+
+std::vector<cv::Rect> boxes_of_numbers(const cv::Mat& numbers, int count) {
+  std::vector<cv::Rect> boxes(static_cast<std::size_t>(count) + 1);
+  numbers.type() == CV_16UC1 ? find_boxes<std::uint16_t>(numbers, boxes) : find_boxes<int>(numbers, boxes);
+  return boxes;
 }
 
 CellGrid::CellGrid(const Camera& camera)
@@ -24,7 +56,9 @@ CellGrid::CellGrid(const Camera& camera)
     }
   }
   const auto bounds = camera.undistorted_bounds();
-  table_origin_ = {static_cast<float>(bounds[0]), static_cast<float>(bounds[1])};
+  projection_ << static_cast<float>(camera.fx / side_), 0.0F,
+      static_cast<float>((camera.cx - bounds[0]) / side_), 0.0F, static_cast<float>(camera.fy / side_),
+      static_cast<float>((camera.cy - bounds[1]) / side_), 0.0F, 0.0F, 1.0F;
   table_size_ = {static_cast<int>((bounds[2] - bounds[0]) / side_) + 1,
                  static_cast<int>((bounds[3] - bounds[1]) / side_) + 1};
   table_.reserve(static_cast<std::size_t>(table_size_.area()));
@@ -51,19 +85,6 @@ cv::Point CellGrid::cell_of(const cv::Point2f& pixel) const {
           std::clamp(static_cast<int>(pixel.y) / side_, 0, size_.height - 1)};
 }
 
-int CellGrid::cell_that_sees(const Eigen::Vector3f& point) const {
-  const float u = static_cast<float>(camera_.fx) * point.x() / point.z() + static_cast<float>(camera_.cx);
-  const float v = static_cast<float>(camera_.fy) * point.y() / point.z() + static_cast<float>(camera_.cy);
-  const float column = (u - table_origin_.x) / static_cast<float>(side_);
-  const float row = (v - table_origin_.y) / static_cast<float>(side_);
-  if (!(column >= 0.0F && row >= 0.0F && column < static_cast<float>(table_size_.width) &&
-        row < static_cast<float>(table_size_.height))) {
-    return -1;
-  }
-  return table_[static_cast<std::size_t>(static_cast<int>(row) * table_size_.width +
-                                         static_cast<int>(column))];
-}
-
 cv::Mat CellGrid::depth_cells(const cv::Mat& depth, const DepthOptions& options) const {
   cv::Mat cells = cv::Mat::zeros(size_, CV_32FC1);
   if (depth.empty()) return cells;
@@ -77,20 +98,30 @@ cv::Mat CellGrid::depth_cells(const cv::Mat& depth, const DepthOptions& options)
   return cells;
 }
 
-cv::Mat CellGrid::mask_cells(const cv::Mat& mask) const {
-  cv::Mat cells(size_, CV_8UC1);
-  for (int y = 0; y < size_.height; ++y) {
-    for (int x = 0; x < size_.width; ++x) {
-      cells.at<std::uint8_t>(y, x) = mask.at<std::uint8_t>(pixel_of({x, y})) != 0 ? 255 : 0;
+cv::Mat CellGrid::mask_cells(const cv::Mat& mask, const cv::Rect& area) const {
+  cv::Mat cells(area.size(), CV_8UC1);
+  const cv::Point origin = area.tl() * side_;
+  for (int y = 0; y < area.height; ++y) {
+    for (int x = 0; x < area.width; ++x) {
+      const cv::Point pixel = pixel_of(area.tl() + cv::Point(x, y)) - origin;
+      cells.at<std::uint8_t>(y, x) = mask.at<std::uint8_t>(pixel) != 0 ? 255 : 0;
     }
   }
   return cells;
 }
 
-cv::Mat CellGrid::in_pixels(const cv::Mat& cells) const {
+cv::Rect CellGrid::cells_of(const cv::Rect& pixels) const {
+  return {cell_of(pixels.tl()), cell_of(pixels.br() - cv::Point(1, 1)) + cv::Point(1, 1)};
+}
+
+cv::Rect CellGrid::pixels_of(const cv::Rect& cells) const {
+  return cv::Rect(cells.tl() * side_, cells.size() * side_) & cv::Rect(0, 0, camera_.width, camera_.height);
+}
+
+cv::Mat CellGrid::in_pixels(const cv::Mat& values, const cv::Rect& cells) const {
   cv::Mat large;
-  cv::resize(cells, large, size_ * side_, 0, 0, cv::INTER_NEAREST);
-  return large(cv::Rect(0, 0, camera_.width, camera_.height)).clone();
+  cv::resize(values, large, cells.size() * side_, 0, 0, cv::INTER_NEAREST);
+  return large(cv::Rect({0, 0}, pixels_of(cells).size()));
 }
 
 }  // namespace roslam

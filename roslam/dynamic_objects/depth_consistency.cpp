@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 namespace roslam {
 
@@ -32,72 +33,157 @@ void depth_range(const cv::Mat& depth, cv::Mat& nearest, cv::Mat& farthest) {
   }
 }
 
-struct Votes {
-  std::vector<std::uint8_t> through;  // frames that saw through a cell's surface
-  std::vector<std::uint8_t> same;     // frames that saw it
-};
-
-// Noise filter: set cells with at least so many set ones among themselves and their eight neighbours.
-cv::Mat with_support(const cv::Mat& cells, int needed) {
-  cv::Mat result = cv::Mat::zeros(cells.size(), CV_8UC1);
-  for (int y = 1; y + 1 < cells.rows; ++y) {
-    for (int x = 1; x + 1 < cells.cols; ++x) {
-      if (cells.at<std::uint8_t>(y, x) == 0) continue;
+// Noise filter: cells with at least so many votes, if enough among themselves and their eight neighbours have
+// as many.
+cv::Mat with_support(const cv::Mat& votes, int needed, int cells) {
+  cv::Mat result = cv::Mat::zeros(votes.size(), CV_8UC1);
+  for (int y = 1; y + 1 < votes.rows; ++y) {
+    for (int x = 1; x + 1 < votes.cols; ++x) {
+      if (votes.at<std::uint8_t>(y, x) < needed) continue;
       int count = 0;
       for (int dy = -1; dy <= 1; ++dy) {
-        const auto* row = cells.ptr<std::uint8_t>(y + dy);
-        for (int dx = -1; dx <= 1; ++dx) count += row[x + dx] != 0 ? 1 : 0;
+        const auto* row = votes.ptr<std::uint8_t>(y + dy);
+        for (int dx = -1; dx <= 1; ++dx) count += row[x + dx] >= needed ? 1 : 0;
       }
-      if (count >= needed) result.at<std::uint8_t>(y, x) = 255;
+      if (count >= cells) result.at<std::uint8_t>(y, x) = 255;
     }
   }
   return result;
 }
 }  // namespace
 
-DepthEvidence DepthConsistency::examine(const CellGrid& grid, const cv::Mat& depth, const SE3& T_camera_world,
-                                        double timestamp) const {
-  DepthEvidence evidence{cv::Mat::zeros(grid.size(), CV_8UC1), cv::Mat::zeros(grid.size(), CV_32FC1)};
-  Votes votes{std::vector<std::uint8_t>(grid.cells(), 0), std::vector<std::uint8_t>(grid.cells(), 0)};
-  const auto* z_of = depth.ptr<float>();
-  auto* static_for = evidence.static_for.ptr<float>();
+// Known cells of the current frame with their points, packed so that many are transformed at once.
+struct DepthConsistency::PackedCells {
+  std::vector<int> cell;
+  std::vector<float> x, y, z;   // the point, metres
+  std::vector<float> variance;  // of its depth
+
+  void add(int index, const Eigen::Vector3f& ray, float depth, float variance_of_depth) {
+    cell.push_back(index);
+    x.push_back(ray.x() * depth);
+    y.push_back(ray.y() * depth);
+    z.push_back(depth);
+    variance.push_back(variance_of_depth);
+  }
+};
+
+struct DepthConsistency::Votes {
+  explicit Votes(const cv::Size& size)
+      : through(cv::Mat::zeros(size, CV_8UC1)), same(through.clone()), age(cv::Mat::zeros(size, CV_32FC1)) {}
+
+  void copy(int from, int to) {
+    for (cv::Mat* votes : {&through, &same}) votes->data[to] = votes->data[from];
+    age.ptr<float>()[to] = age.ptr<float>()[from];
+  }
+
+  cv::Mat through;  // CV_8UC1 of cells: how many frames saw through the surface
+  cv::Mat same;     // CV_8UC1 of cells: how many saw it
+  cv::Mat age;      // CV_32FC1 of cells: of the oldest that saw it, seconds
+};
+
+float DepthConsistency::variance(float depth) const {
+  const auto sigma =
+      static_cast<float>(noise_.depth_sigma) + static_cast<float>(noise_.depth_sigma_growth) * depth * depth;
+  return sigma * sigma;
+}
+
+// The votes of all past frames on those cells.
+void DepthConsistency::vote(const CellGrid& grid, const PackedCells& cells, const SE3& T_camera_world,
+                            double timestamp, Votes& votes) const {
+  const std::size_t count = cells.cell.size();
+  std::vector<float> column(count), row(count), z(count);
+  const auto relative_tolerance = static_cast<float>(options_.depth_tolerance);
   const SE3 T_world_camera = T_camera_world.inverse();
   for (const PastDepth& past : past_) {
     const SE3 T_past_camera = past.T_camera_world * T_world_camera;
-    const Eigen::Matrix3f R = T_past_camera.rotation().toRotationMatrix().cast<float>();
-    const Eigen::Vector3f t = T_past_camera.translation().cast<float>();
+    const Eigen::Matrix3f M = grid.projection() * T_past_camera.rotation().toRotationMatrix().cast<float>();
+    const Eigen::Vector3f m = grid.projection() * T_past_camera.translation().cast<float>();
+    for (std::size_t i = 0; i < count; ++i) {
+      z[i] = M(2, 0) * cells.x[i] + M(2, 1) * cells.y[i] + M(2, 2) * cells.z[i] + m(2);
+      const float inverse = 1.0F / z[i];
+      column[i] = inverse * (M(0, 0) * cells.x[i] + M(0, 1) * cells.y[i] + M(0, 2) * cells.z[i] + m(0));
+      row[i] = inverse * (M(1, 0) * cells.x[i] + M(1, 1) * cells.y[i] + M(1, 2) * cells.z[i] + m(1));
+    }
     const auto age = static_cast<float>(timestamp - past.timestamp);
-    for (std::size_t i = 0; i < grid.cells(); ++i) {
-      if (z_of[i] <= 0.0F) continue;
-      const Eigen::Vector3f point = R * (grid.ray(i) * z_of[i]) + t;
-      if (point.z() < 0.05F) continue;
-      const int cell = grid.cell_that_sees(point);
-      if (cell < 0) continue;
-      const float nearest = past.nearest.ptr<float>()[cell];
+    for (std::size_t i = 0; i < count; ++i) {
+      const int seen = z[i] < 0.05F ? -1 : grid.cell_at(column[i], row[i]);
+      const float nearest = seen < 0 ? 0.0F : past.nearest.ptr<float>()[seen];
       if (nearest <= 0.0F) continue;
-      const double sigma = std::hypot(noise_.sigma_of_depth(z_of[i]), noise_.sigma_of_depth(nearest));
-      const auto tolerance = static_cast<float>(3.0 * sigma + options_.depth_tolerance * point.z());
-      if (point.z() < nearest - tolerance) {
-        ++votes.through[i];
-      } else if (point.z() <= past.farthest.ptr<float>()[cell] + tolerance) {
-        ++votes.same[i];
-        static_for[i] = std::max(static_for[i], age);
+      const float tolerance =
+          3.0F * std::sqrt(cells.variance[i] + variance(nearest)) + relative_tolerance * z[i];
+      const int cell = cells.cell[i];
+      if (z[i] < nearest - tolerance) {
+        ++votes.through.data[cell];
+      } else if (z[i] <= past.farthest.ptr<float>()[seen] + tolerance) {
+        ++votes.same.data[cell];
+        votes.age.ptr<float>()[cell] = std::max(votes.age.ptr<float>()[cell], age);
       }
     }
   }
-  cv::Mat through = cv::Mat::zeros(grid.size(), CV_8UC1);
-  const int needed = std::min<int>(2, static_cast<int>(past_.size()));
-  for (std::size_t i = 0; i < grid.cells(); ++i) {
-    if (needed > 0 && votes.through[i] >= needed) through.ptr<std::uint8_t>()[i] = 255;
+}
+
+// Votes on one cell of each block first. Where its surface and those of the neighbouring blocks were seen and
+// never seen through, its votes hold for the other cells of the block that lie on the same surface; elsewhere
+// each cell is voted on.
+DepthConsistency::Votes DepthConsistency::votes_on(const CellGrid& grid, const cv::Mat& depth,
+                                                   const SE3& T_camera_world, double timestamp) const {
+  constexpr int kBlock = 4;  // cells
+  Votes votes(grid.size());
+  const cv::Size blocks((depth.cols + kBlock - 1) / kBlock, (depth.rows + kBlock - 1) / kBlock);
+  cv::Mat first(blocks, CV_32SC1, cv::Scalar(-1));
+  const auto* z_of = depth.ptr<float>();
+  const auto for_each_known = [&](const auto& visit) {
+    int cell = 0;
+    for (int y = 0; y < depth.rows; ++y) {
+      for (int x = 0; x < depth.cols; ++x, ++cell) {
+        if (z_of[cell] > 0.0F) visit(cell, cv::Point(x / kBlock, y / kBlock));
+      }
+    }
+  };
+  PackedCells cells;
+  const auto add = [&](int cell) {
+    cells.add(cell, grid.ray(static_cast<std::size_t>(cell)), z_of[cell], variance(z_of[cell]));
+  };
+  for_each_known([&](int cell, const cv::Point& block) {
+    if (first.at<int>(block) >= 0) return;
+    first.at<int>(block) = cell;
+    add(cell);
+  });
+  vote(grid, cells, T_camera_world, timestamp, votes);
+  cv::Mat is_suspect = cv::Mat::zeros(blocks, CV_8UC1);
+  for (int i = 0; i < blocks.area(); ++i) {
+    const int cell = first.ptr<int>()[i];
+    is_suspect.data[i] = cell >= 0 && (votes.through.data[cell] != 0 || votes.same.data[cell] == 0);
   }
+  cv::dilate(is_suspect, is_suspect, cv::Mat());
+  cells = {};
+  const auto same_surface = static_cast<float>(options_.depth_tolerance);
+  for_each_known([&](int cell, const cv::Point& block) {
+    const int known = first.at<int>(block);
+    const bool holds = is_suspect.at<std::uint8_t>(block) == 0 &&
+                       std::abs(z_of[cell] - z_of[known]) <= same_surface * z_of[known];
+    if (holds)
+      votes.copy(known, cell);
+    else if (cell != known)
+      add(cell);
+  });
+  vote(grid, cells, T_camera_world, timestamp, votes);
+  return votes;
+}
+
+DepthEvidence DepthConsistency::examine(const CellGrid& grid, const cv::Mat& depth, const SE3& T_camera_world,
+                                        double timestamp) const {
+  const Votes votes = votes_on(grid, depth, T_camera_world, timestamp);
+  DepthEvidence evidence{cv::Mat::zeros(grid.size(), CV_8UC1), votes.age};
+  if (past_.empty()) return evidence;
+  const int needed = std::min<int>(2, static_cast<int>(past_.size()));
   constexpr int kMinSupport = 5;  // cells
-  const cv::Mat moving = with_support(through, kMinSupport);
+  const cv::Mat moving = with_support(votes.through, needed, kMinSupport);
   for (std::size_t i = 0; i < grid.cells(); ++i) {
-    auto& state = evidence.state.ptr<std::uint8_t>()[i];
-    if (moving.ptr<std::uint8_t>()[i] != 0) {
-      state = static_cast<std::uint8_t>(MotionEvidence::kMoving);
-    } else if (votes.same[i] > 0 && votes.through[i] == 0) {
-      state = static_cast<std::uint8_t>(MotionEvidence::kStatic);
+    if (moving.data[i] != 0) {
+      evidence.state.data[i] = static_cast<std::uint8_t>(MotionEvidence::kMoving);
+    } else if (votes.same.data[i] > 0 && votes.through.data[i] == 0) {
+      evidence.state.data[i] = static_cast<std::uint8_t>(MotionEvidence::kStatic);
     }
   }
   return evidence;

@@ -57,6 +57,15 @@ class DepthConsistency {
     cv::Mat farthest;  // CV_32FC1: largest depth around each cell
   };
 
+  struct PackedCells;
+  struct Votes;
+
+  Votes votes_on(const CellGrid& grid, const cv::Mat& depth, const SE3& T_camera_world,
+                 double timestamp) const;
+  void vote(const CellGrid& grid, const PackedCells& cells, const SE3& T_camera_world, double timestamp,
+            Votes& votes) const;
+  float variance(float depth) const;
+
   DynamicObjectOptions options_;
   MeasurementNoise noise_;
   std::deque<PastDepth> past_;

@@ -40,6 +40,7 @@ DynamicObjectDetector::DynamicObjectDetector(const Camera& camera, const Setting
     : camera_(camera),
       settings_(settings),
       grid_(camera),
+      corners_(camera),
       flow_(camera, settings.dynamic_objects, settings.depth, settings.noise, settings.pose),
       history_(settings.dynamic_objects, settings.noise),
       object_tracker_(settings.dynamic_objects) {
@@ -68,22 +69,20 @@ DynamicObjects DynamicObjectDetector::detect(const Frame& frame, const cv::Mat& 
     grow_masks(scene.owners, {depth_cells_, barrier, scene.seeds, scene.moving}, grid_, options.growth);
   }
   if (options.depth_consistency || options.flow) add_unlabelled(scene);
-  return compose_masks(scene);
+  DynamicObjects dynamic_objects = compose_masks(scene);
+  mask_ = dynamic_objects.mask;
+  return dynamic_objects;
 }
 
 void DynamicObjectDetector::begin_frame(const Frame& frame, const cv::Mat& grey,
                                         const std::optional<SE3>& predicted_T_camera_world) {
-  current_ = {frame.index, frame.timestamp, flow_pyramid(grey), frame.depth, predicted_T_camera_world, {},
-              {}};
+  current_ = {frame.index, frame.timestamp, flow_pyramid(grey), frame.depth, predicted_T_camera_world, {}};
   depth_cells_ = grid_.depth_cells(frame.depth, settings_.depth);
   pose_from_flow_.reset();
-  if (predicted_T_camera_world && !past_.empty()) {
-    pose_from_flow_ = flow_.camera_pose(past_.back(), current_, *predicted_T_camera_world);
-    if (pose_from_flow_) current_.T_camera_world = pose_from_flow_;
-  }
+  if (!past_.empty()) pose_from_flow_ = flow_.track(past_.back(), current_);
 }
 
-CellScene DynamicObjectDetector::gather_evidence() const {
+CellScene DynamicObjectDetector::gather_evidence() {
   const DynamicObjectOptions& options = settings_.dynamic_objects;
   CellScene scene;
   scene.depth = depth_cells_;
@@ -203,14 +202,17 @@ void DynamicObjectDetector::add_unlabelled(CellScene& scene) {
   const auto evidence = evidence_by_owner(numbers, static_cast<std::size_t>(count), scene.depth_evidence,
                                           scene.flow, grid_, options);
   const double least = std::max(8.0, options.min_object_share * static_cast<double>(grid_.cells()));
+  const std::vector<cv::Rect> boxes = boxes_of_numbers(numbers, count);
   std::vector<MovableObject> found;
   std::vector<int> found_numbers;
   for (int n = 1; n < count; ++n) {
     const auto& e = evidence[static_cast<std::size_t>(n)];
     if (e.cells < least || contradicts_motion(e)) continue;
+    const cv::Rect& box = boxes[static_cast<std::size_t>(n)];
     MovableObject object;
     object.kind = Movable::kUnknown;
-    if (!take_mask(object, grid_.in_pixels(numbers == n))) continue;
+    object.box = grid_.pixels_of(box);
+    object.mask = grid_.in_pixels(numbers(box) == n, box);
     object.median_depth = median_depth(object, depth_cells_, grid_);
     found.push_back(std::move(object));
     found_numbers.push_back(n);
@@ -219,17 +221,21 @@ void DynamicObjectDetector::add_unlabelled(CellScene& scene) {
   for (const auto& object : object_tracker_.objects()) old_ids.push_back(object.id);
   const std::vector<int> found_ids = object_tracker_.update_unlabelled(std::move(found), current_.timestamp);
   // The update has changed the order of the objects.
-  cv::Mat owners = cv::Mat::zeros(grid_.size(), CV_32SC1);
+  std::vector<int> owner_of_old(old_ids.size() + 1, 0);
+  std::vector<int> owner_of_number(static_cast<std::size_t>(count) + 1, 0);
   const auto& objects = object_tracker_.objects();
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    const int number = static_cast<int>(i) + 1;
-    if (const auto old = position_of(objects[i].id, old_ids)) {
-      owners.setTo(number, scene.owners == static_cast<int>(*old) + 1);
-    }
+    const int owner = static_cast<int>(i) + 1;
+    if (const auto old = position_of(objects[i].id, old_ids)) owner_of_old[*old + 1] = owner;
     const auto now = position_of(objects[i].id, found_ids);
-    if (now && is_seen_repeatedly(objects[i])) owners.setTo(number, numbers == found_numbers[*now]);
+    if (now && is_seen_repeatedly(objects[i]))
+      owner_of_number[static_cast<std::size_t>(found_numbers[*now])] = owner;
   }
-  scene.owners = owners;
+  for (std::size_t i = 0; i < grid_.cells(); ++i) {
+    int& owner = scene.owners.ptr<int>()[i];
+    const int found_owner = owner_of_number[static_cast<std::size_t>(numbers.ptr<int>()[i])];
+    owner = found_owner != 0 ? found_owner : owner_of_old[static_cast<std::size_t>(owner)];
+  }
 }
 
 DynamicObjects DynamicObjectDetector::compose_masks(const CellScene& scene) {
@@ -239,28 +245,44 @@ DynamicObjects DynamicObjectDetector::compose_masks(const CellScene& scene) {
   dynamic_objects.label_age = labelled_index_ ? static_cast<int>(current_.index - *labelled_index_) : -1;
   auto& objects = object_tracker_.objects();
   if (objects.empty()) return dynamic_objects;
-  const cv::Mat owners = owners_of_pixels(scene, objects, current_.depth, grid_, settings_.dynamic_objects);
-  const cv::Mat mask = owners != 0;
-  cv::Mat resting = cv::Mat::zeros(mask.size(), CV_8UC1);
+  const auto [area, owners] =
+      owners_of_pixels(scene, objects, current_.depth, grid_, settings_.dynamic_objects);
+  const auto boxes = boxes_of_numbers(owners, static_cast<int>(objects.size()));
+  const cv::Size image(camera_.width, camera_.height);
+  cv::Mat mask = cv::Mat::zeros(image, CV_8UC1);
+  cv::Mat resting;
   std::vector<MovableObject> kept;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     MovableObject& object = objects[i];
-    if (!take_mask(object, owners == static_cast<int>(i) + 1)) {
+    if (boxes[i + 1].empty()) {
       // Not in this mask, but it may be in the next.
       if (!object.is_confirmed || object.kind == Movable::kUnknown) kept.push_back(object);
       continue;
     }
+    object.box = boxes[i + 1] + area.tl();
+    object.mask = owners(boxes[i + 1]) == static_cast<int>(i) + 1;
     object.median_depth = median_depth(object, depth_cells_, grid_);
-    if (object.is_at_rest) draw_object(object, resting);
+    draw_object(object, mask);
+    if (object.is_at_rest) {
+      if (resting.empty()) resting = cv::Mat::zeros(image, CV_8UC1);
+      draw_object(object, resting);
+    }
     kept.push_back(object);
     dynamic_objects.objects.push_back(object);
   }
   objects = kept;
-  if (cv::countNonZero(mask) == 0) return dynamic_objects;
-  const int margin = settings_.dynamic_objects.margin;
-  dynamic_objects.mask = dilated(mask, margin);
+  if (dynamic_objects.objects.empty()) return dynamic_objects;
   // Without what lies within the margin of another object.
-  if (cv::countNonZero(resting) > 0) dynamic_objects.resting = dilated_apart(resting, mask, margin);
+  const int margin = settings_.dynamic_objects.margin;
+  const cv::Rect dilated_area = widened(area, margin) & cv::Rect({0, 0}, image);
+  if (!resting.empty()) {
+    cv::Mat part = resting(dilated_area);
+    dilated_apart(part, mask(dilated_area), margin).copyTo(part);
+  }
+  cv::Mat part = mask(dilated_area);
+  dilated(part, margin).copyTo(part);
+  dynamic_objects.mask = mask;
+  dynamic_objects.resting = resting;
   return dynamic_objects;
 }
 
@@ -284,11 +306,15 @@ void DynamicObjectDetector::reset() {
 }
 
 void DynamicObjectDetector::remember(const std::optional<SE3>& T_camera_world,
-                                     std::vector<cv::Point2f> points,
-                                     std::vector<cv::Point2f> removed_points) {
+                                     const std::vector<cv::Point2f>& points,
+                                     const std::vector<cv::Point2f>& removed_points) {
   current_.T_camera_world = T_camera_world;
-  current_.points = std::move(points);
-  current_.moving_points = std::move(removed_points);
+  for (Corner& corner : current_.corners) {
+    const cv::Point pixel(static_cast<int>(corner.pixel.x), static_cast<int>(corner.pixel.y));
+    corner.is_removed = !mask_.empty() && mask_.at<std::uint8_t>(pixel) != 0;
+  }
+  corners_.replenish(current_.corners, points, false);
+  corners_.replenish(current_.corners, removed_points, true);
   if (T_camera_world && settings_.dynamic_objects.depth_consistency) {
     history_.add(depth_cells_, *T_camera_world, current_.timestamp);
   }

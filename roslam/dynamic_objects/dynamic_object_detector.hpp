@@ -51,8 +51,8 @@ class DynamicObjectDetector {
 
   /// Stores the frame last detected in for later ones: its pose, if tracked, and the corners (pixels, as
   /// taken) outside and inside the mask.
-  void remember(const std::optional<SE3>& T_camera_world, std::vector<cv::Point2f> points,
-                std::vector<cv::Point2f> removed_points);
+  void remember(const std::optional<SE3>& T_camera_world, const std::vector<cv::Point2f>& points,
+                const std::vector<cv::Point2f>& removed_points);
 
   /// Applies a correction of the map to the stored frames; T_new_old maps old to new world coordinates.
   void apply_correction(const SE3& T_new_old);
@@ -71,7 +71,7 @@ class DynamicObjectDetector {
  private:
   void begin_frame(const Frame& frame, const cv::Mat& grey,
                    const std::optional<SE3>& predicted_T_camera_world);
-  CellScene gather_evidence() const;
+  CellScene gather_evidence();
   void reject_contradicted_motion(CellScene& scene) const;
   std::optional<std::vector<MovableObject>> labelled_objects(const LabelledFrame& labels);
   void assess_objects(CellScene& scene);
@@ -83,11 +83,13 @@ class DynamicObjectDetector {
   Camera camera_;
   Settings settings_;
   CellGrid grid_;
+  CornerSelection corners_;
   FlowConsistency flow_;
   DepthConsistency history_;
   ObjectTracker object_tracker_;
   PastFrame current_;
   cv::Mat depth_cells_;                // of the current frame
+  cv::Mat mask_;                       // of the current frame; empty = nothing is removed
   std::optional<SE3> pose_from_flow_;  // of the current frame
   std::deque<PastFrame> past_;
   std::optional<std::size_t> labelled_index_;  // of the newest frame whose labels were used

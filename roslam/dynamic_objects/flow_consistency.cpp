@@ -10,53 +10,70 @@
 namespace roslam {
 
 namespace {
-constexpr std::size_t kPosePoints = 200;
-constexpr std::size_t kCheckedPoints = 200;
-constexpr std::size_t kCheckedRemovedPoints = 150;
 constexpr int kMinPosePoints = 20;
 constexpr double kMinAgreement = 0.5;  // of the points tracked
 constexpr double kFar = 1e4;           // metres, for unknown depth: only rotation matters
-
-Eigen::Vector2d vector_of(const cv::Point2f& point) { return {point.x, point.y}; }
 
 }  // namespace
 
 cv::Point2f FlowConsistency::expected(const PastFrame& past, const PastFrame& current,
                                       const cv::Point2f& point) const {
+  return expected(past, current, point, camera_.undistort({point.x, point.y}));
+}
+
+cv::Point2f FlowConsistency::expected(const PastFrame& past, const PastFrame& current,
+                                      const cv::Point2f& point, const Eigen::Vector2d& undistorted) const {
   if (!past.T_camera_world || !current.T_camera_world) return point;
   const float depth = past.depth.empty() ? 0.0F : depth_at(past.depth, point, depth_);
-  const Eigen::Vector3d in_past =
-      camera_.unproject(camera_.undistort(vector_of(point)), depth > 0.0F ? depth : kFar);
+  const Eigen::Vector3d in_past = camera_.unproject(undistorted, depth > 0.0F ? depth : kFar);
   const Eigen::Vector3d seen = *current.T_camera_world * (past.T_camera_world->inverse() * in_past);
   if (seen.z() < 0.05) return point;
   const Eigen::Vector2d pixel = camera_.distort(camera_.project(seen));
   return {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
 }
 
-std::optional<SE3> FlowConsistency::camera_pose(const PastFrame& last, const PastFrame& current,
-                                                const SE3& predicted_T_camera_world) const {
-  if (!last.T_camera_world) return std::nullopt;
-  PastFrame predicted = current;
-  predicted.T_camera_world = predicted_T_camera_world;
-  const auto points = thinned(last.points, kPosePoints);
+std::optional<SE3> FlowConsistency::track(const PastFrame& last, PastFrame& current) const {
+  std::vector<cv::Point2f> points;
   std::vector<cv::Point2f> guess;
-  for (const auto& point : points) guess.push_back(expected(last, predicted, point));
+  for (const Corner& corner : last.corners) {
+    points.push_back(corner.pixel);
+    guess.push_back(expected(last, current, corner.pixel, corner.undistorted));
+  }
   const auto found = track_points(last.pyramid, current.pyramid, points, guess);
+  current.corners.clear();
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (!found[i]) continue;
+    const Corner& corner = last.corners[i];
+    current.corners.push_back(
+        {corner.track, *found[i], camera_.undistort({found[i]->x, found[i]->y}), corner.is_removed});
+  }
+  const auto pose = camera_pose(last, current);
+  if (pose) current.T_camera_world = pose;
+  return pose;
+}
+
+std::optional<SE3> FlowConsistency::camera_pose(const PastFrame& last, const PastFrame& current) const {
+  if (!last.T_camera_world || !current.T_camera_world || last.depth.empty()) return std::nullopt;
   const SE3 T_world_last = last.T_camera_world->inverse();
+  std::vector<CornerMatch> usable;
+  for (const auto& match : common_corners(last, current)) {
+    if (!match.from->is_removed && depth_at(last.depth, match.from->pixel, depth_) > 0.0F)
+      usable.push_back(match);
+  }
   std::vector<PoseMeasurement> measurements;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!found[i] || last.depth.empty()) continue;
-    const float depth = depth_at(last.depth, points[i], depth_);
-    if (depth <= 0.0F) continue;
+  constexpr std::size_t kEnough = 200;
+  const std::size_t count = std::min(usable.size(), kEnough);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& [from, to] = usable[i * usable.size() / count];
+    const float depth = depth_at(last.depth, from->pixel, depth_);
+    const float now = current.depth.empty() ? 0.0F : depth_at(current.depth, to->pixel, depth_);
     PoseMeasurement m;
-    m.point_world = T_world_last * camera_.unproject(camera_.undistort(vector_of(points[i])), depth);
-    const Eigen::Vector2f pixel = camera_.undistort(vector_of(*found[i])).cast<float>();
-    const float now = current.depth.empty() ? 0.0F : depth_at(current.depth, *found[i], depth_);
-    m.measurement = Measurement::make(pixel, now, 1.0F, noise_);
+    m.point_world = T_world_last * camera_.unproject(from->undistorted, depth);
+    m.measurement = Measurement::make(to->undistorted.cast<float>(), now, 1.0F, noise_);
     measurements.push_back(m);
   }
   if (static_cast<int>(measurements.size()) < kMinPosePoints) return std::nullopt;
-  const OptimisedPose pose = optimise_pose(camera_, measurements, predicted_T_camera_world, pose_);
+  const OptimisedPose pose = optimise_pose(camera_, measurements, *current.T_camera_world, pose_);
   if (pose.inliers < kMinPosePoints ||
       pose.inliers < kMinAgreement * static_cast<double>(measurements.size()))
     return std::nullopt;
@@ -89,43 +106,46 @@ double FlowConsistency::residual(const Eigen::Vector2d& from, float depth, const
   return (to - begin - share * along).squaredNorm() / (pixel_sigma * pixel_sigma);
 }
 
-TrackedPoints FlowConsistency::follow(const PastFrame& past, const PastFrame& current) const {
+TrackedPoints FlowConsistency::follow(const PastFrame& past, PastFrame& current) const {
   if (!past.T_camera_world || !current.T_camera_world) return {};
-  std::vector<cv::Point2f> points = thinned(past.points, kCheckedPoints);
-  const auto removed = thinned(past.moving_points, kCheckedRemovedPoints);
-  const std::size_t static_count = points.size();
-  points.insert(points.end(), removed.begin(), removed.end());
-  std::vector<cv::Point2f> guess;
-  for (const auto& point : points) guess.push_back(expected(past, current, point));
-  const auto found = track_points(past.pyramid, current.pyramid, points, guess);
+  const auto matches = common_corners(past, current);
   const SE3 T_current_past = *current.T_camera_world * past.T_camera_world->inverse();
-  struct Followed {
-    cv::Point2f now;
-    Eigen::Vector2d from, to;
-    float depth;
-  };
-  std::vector<Followed> followed;
-  std::vector<double> errors;  // of points outside the mask of the past frame
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!found[i]) continue;
-    const Followed f{*found[i], camera_.undistort(vector_of(points[i])),
-                     camera_.undistort(vector_of(*found[i])),
-                     past.depth.empty() ? 0.0F : depth_at(past.depth, points[i], depth_)};
-    if (i < static_count) errors.push_back(residual(f.from, f.depth, f.to, T_current_past, 1.0));
-    followed.push_back(f);
+  std::vector<float> depths;
+  std::vector<double> errors;  // of corners outside the mask of the past frame
+  for (const auto& [from, to] : matches) {
+    depths.push_back(past.depth.empty() ? 0.0F : depth_at(past.depth, from->pixel, depth_));
+    if (!from->is_removed)
+      errors.push_back(residual(from->undistorted, depths.back(), to->undistorted, T_current_past, 1.0));
   }
   constexpr std::size_t kMinPoints = 10;
   if (errors.size() < kMinPoints) return {};
   // Most points are static, so the median residual gives the noise of pixels and pose in this frame.
   constexpr double kSigmaOfMedian = 1.1774;  // median of a Rayleigh distribution, in sigmas
-  const double sigma = std::max(1.0, std::sqrt(upper_median(errors)) / kSigmaOfMedian);
-  const double limit = options_.flow_tolerance * options_.flow_tolerance;
   TrackedPoints result;
-  result.sigma = sigma;
-  for (const auto& f : followed) {
-    const bool moves = residual(f.from, f.depth, f.to, T_current_past, sigma) > limit;
-    (moves ? result.moving : result.at_rest).push_back(f.now);
+  result.sigma = std::max(1.0, std::sqrt(upper_median(errors)) / kSigmaOfMedian);
+  const double limit = options_.flow_tolerance * options_.flow_tolerance;
+  std::vector<CornerMatch> moving;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const auto& [from, to] = matches[i];
+    if (residual(from->undistorted, depths[i], to->undistorted, T_current_past, result.sigma) > limit) {
+      moving.push_back(matches[i]);
+    } else {
+      result.at_rest.push_back(to->pixel);
+    }
   }
+  // Only corners that were tracked correctly move with the static scene, so that the others alone are
+  // checked.
+  const auto is_confirmed = are_tracked_back(past.pyramid, current.pyramid, moving);
+  std::vector<int> lost;
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    if (is_confirmed[i])
+      result.moving.push_back(moving[i].to->pixel);
+    else
+      lost.push_back(moving[i].to->track);
+  }
+  std::erase_if(current.corners, [&](const Corner& corner) {
+    return std::binary_search(lost.begin(), lost.end(), corner.track);
+  });
   return result;
 }
 

@@ -28,15 +28,16 @@ class FlowConsistency {
                   const MeasurementNoise& noise, const PoseOptimiserOptions& pose)
       : camera_(camera), options_(options), depth_(depth), noise_(noise), pose_(pose) {}
 
-  /// T_camera_world of the current frame by the flow of the last frame's static points; nothing if too few
-  /// agree.
-  std::optional<SE3> camera_pose(const PastFrame& last, const PastFrame& current,
-                                 const SE3& predicted_T_camera_world) const;
+  /// Tracks the corners of the last frame to the current one, whose pose is a prediction or unknown. Sets its
+  /// corners, and returns its T_camera_world by those that were outside the mask; nothing if no pose is
+  /// predicted or too few agree.
+  std::optional<SE3> track(const PastFrame& last, PastFrame& current) const;
 
-  /// Tracks points from a past frame and classifies them. A point moves if it differs by more than the noise
-  /// of pixels, depth and pose from its reprojection by its depth in the past frame, or, if that is unknown,
-  /// from its epipolar line. Empty if a pose is unknown.
-  TrackedPoints follow(const PastFrame& past, const PastFrame& current) const;
+  /// Classifies the corners that a past frame and the current one have in common. One moves if it differs by
+  /// more than the noise of pixels, depth and pose from its reprojection by its depth in the past frame, or,
+  /// if that is unknown, from its epipolar line; if it then fails the forward-backward check it is dropped
+  /// from the current frame. Empty if a pose is unknown.
+  TrackedPoints follow(const PastFrame& past, PastFrame& current) const;
 
   /// The moving points with others nearby, since single ones may be outliers.
   std::vector<cv::Point2f> in_company(const TrackedPoints& followed) const;
@@ -46,6 +47,9 @@ class FlowConsistency {
   cv::Point2f expected(const PastFrame& past, const PastFrame& current, const cv::Point2f& point) const;
 
  private:
+  cv::Point2f expected(const PastFrame& past, const PastFrame& current, const cv::Point2f& point,
+                       const Eigen::Vector2d& undistorted) const;
+  std::optional<SE3> camera_pose(const PastFrame& last, const PastFrame& current) const;
   double residual(const Eigen::Vector2d& from, float depth, const Eigen::Vector2d& to,
                   const SE3& T_current_past, double pixel_sigma) const;
 

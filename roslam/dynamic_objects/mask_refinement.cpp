@@ -43,36 +43,38 @@ cv::Mat dilated_apart(const cv::Mat& part, const cv::Mat& mask, int pixels) {
 }
 
 cv::Mat refine_mask(const cv::Mat& mask, const cv::Mat& depth, const cv::Mat& depth_cells,
-                    const cv::Mat& barrier, const CellGrid& grid, int band) {
+                    const cv::Mat& barrier, const CellGrid& grid, int band, const cv::Point& origin) {
   cv::Mat result = mask.clone();
   if (band <= 0 || depth.empty()) return result;
-  const cv::Rect image(0, 0, mask.cols, mask.rows);
   const cv::Rect box = cv::boundingRect(mask);
   if (box.empty()) return result;
-  const cv::Rect around = (box + cv::Size(2 * band, 2 * band) - cv::Point(band, band)) & image;
-  const DepthRange range = inside_depth(grid.mask_cells(mask), depth_cells, band / grid.side() + 1);
+  const cv::Rect around = widened(box, band) & cv::Rect({0, 0}, mask.size());
+  const cv::Rect cells = grid.cells_of(cv::Rect(origin, mask.size()));
+  const DepthRange range =
+      inside_depth(grid.mask_cells(mask, cells), depth_cells(cells), band / grid.side() + 1);
   cv::Mat smaller;
   const cv::Mat window = cv::getStructuringElement(cv::MORPH_RECT, {2 * band + 1, 2 * band + 1});
   cv::erode(mask(around), smaller, window, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(255));
   const cv::Mat larger = dilated(mask(around), band);
   for (int y = 0; y < around.height; ++y) {
     const int row = around.y + y;
+    const int cell_row = row / grid.side();
     const auto* inner = smaller.ptr<std::uint8_t>(y);
     const auto* outer = larger.ptr<std::uint8_t>(y);
-    const auto* z_row = depth.ptr<float>(row);
+    const auto* z_row = depth.ptr<float>(origin.y + row) + origin.x;
+    const auto* least = range.least.ptr<float>(cell_row);
+    const auto* largest = range.largest.ptr<float>(cell_row);
+    const auto* is_static = barrier.ptr<std::uint8_t>(cells.y + cell_row) + cells.x;
     auto* out = result.ptr<std::uint8_t>(row);
     for (int x = 0; x < around.width; ++x) {
-      if (outer[x] == 0 || inner[x] != 0) continue;
+      if (outer[x] == inner[x]) continue;  // not within the band
       const int column = around.x + x;
+      const int cell = column / grid.side();
       const float z = z_row[column];
-      if (!(z > 0.0F)) continue;
-      const cv::Point cell(column / grid.side(), row / grid.side());
+      if (!(z > 0.0F) || largest[cell] < 0.0F) continue;
       const float tolerance = kStep + kShareOfDepth * z;
-      const float least = range.least.at<float>(cell);
-      const float largest = range.largest.at<float>(cell);
-      if (largest < 0.0F) continue;
-      const bool belongs = z >= least - tolerance && z <= largest + tolerance;
-      if (belongs && out[column] == 0 && barrier.at<std::uint8_t>(cell) != 0) continue;
+      const bool belongs = z >= least[cell] - tolerance && z <= largest[cell] + tolerance;
+      if (belongs && out[column] == 0 && is_static[cell] != 0) continue;
       out[column] = belongs ? 255 : 0;
     }
   }

@@ -46,14 +46,13 @@ int number_areas(const cv::Mat& kinds, const cv::Mat& depth, cv::Mat& areas) {
   return count;
 }
 
-cv::Mat kinds_of(const cv::Mat& labels) {
+// The Movable of each label, for cv::LUT.
+cv::Mat kinds_of_labels() {
   cv::Mat table = cv::Mat::zeros(1, 256, CV_8UC1);
   for (int label = 0; label < kClasses; ++label) {
     table.at<std::uint8_t>(label) = static_cast<std::uint8_t>(movable_of(label));
   }
-  cv::Mat kinds;
-  cv::LUT(labels, table, kinds);
-  return kinds;
+  return table;
 }
 
 // Mean probability of the labelled class over an object's pixels; without a probability map, of the class
@@ -84,31 +83,34 @@ float confidence_of(const MovableObject& object, const Segmentation& segmentatio
 
 std::vector<MovableObject> find_objects(const Segmentation& segmentation, const cv::Mat& depth,
                                         const CellGrid& grid, double min_share) {
-  std::vector<MovableObject> objects;
-  const cv::Mat kinds = kinds_of(segmentation.labels);
-  if (cv::countNonZero(kinds) == 0) return objects;
-  cv::Mat cells(grid.size(), CV_8UC1);
-  for (int y = 0; y < cells.rows; ++y) {
-    for (int x = 0; x < cells.cols; ++x) {
-      cells.at<std::uint8_t>(y, x) = kinds.at<std::uint8_t>(grid.pixel_of({x, y}));
+  const cv::Mat table = kinds_of_labels();
+  cv::Mat kinds(grid.size(), CV_8UC1);  // of cells
+  for (int y = 0; y < kinds.rows; ++y) {
+    for (int x = 0; x < kinds.cols; ++x) {
+      kinds.at<std::uint8_t>(y, x) = table.data[segmentation.labels.at<std::uint8_t>(grid.pixel_of({x, y}))];
     }
   }
   cv::Mat areas;
-  const int count = number_areas(cells, depth, areas);
+  const int count = number_areas(kinds, depth, areas);
   std::vector<int> sizes(static_cast<std::size_t>(count) + 1, 0);
-  for (int i = 0; i < areas.rows * areas.cols; ++i) ++sizes[static_cast<std::size_t>(areas.ptr<int>()[i])];
+  for (std::size_t i = 0; i < grid.cells(); ++i) ++sizes[static_cast<std::size_t>(areas.ptr<int>()[i])];
+  const auto boxes = boxes_of_numbers(areas, count);
   const double least = std::max(1.0, min_share * static_cast<double>(grid.cells()));
+  std::vector<MovableObject> objects;
   for (int area = 1; area <= count; ++area) {
     if (sizes[static_cast<std::size_t>(area)] < least) continue;
-    const cv::Mat own_cells = areas == area;
-    cv::Mat wider;
-    cv::dilate(own_cells, wider, cv::Mat());
-    std::vector<cv::Point> inside;
-    cv::findNonZero(own_cells, inside);
+    const cv::Rect box = widened(boxes[static_cast<std::size_t>(area)], 1) & cv::Rect({0, 0}, grid.size());
+    cv::Mat own_cells = areas(box) == area;
+    double kind = 0.0;
+    cv::minMaxIdx(kinds(box), nullptr, &kind, nullptr, nullptr, own_cells);
+    cv::dilate(own_cells, own_cells, cv::Mat());
+    const cv::Rect pixels = grid.pixels_of(box);
+    cv::Mat own_kind;
+    cv::LUT(segmentation.labels(pixels), table, own_kind);
     MovableObject object;
-    const int kind = cells.at<std::uint8_t>(inside.front());
-    object.kind = static_cast<Movable>(kind);
-    if (!take_mask(object, grid.in_pixels(wider) & (kinds == kind))) continue;
+    object.kind = static_cast<Movable>(static_cast<int>(kind));
+    if (!take_mask(object, grid.in_pixels(own_cells, box) & (own_kind == kind))) continue;
+    object.box += pixels.tl();
     object.confidence = object.decayed_confidence = confidence_of(object, segmentation);
     object.median_depth = median_depth(object, depth, grid);
     objects.push_back(std::move(object));

@@ -12,7 +12,6 @@
 namespace roslam {
 
 namespace {
-constexpr std::size_t kPointsPerObject = 60;
 constexpr std::size_t kMinFlowPoints = 4;
 constexpr double kMinOverlap = 0.3;      // of two masks of one object
 constexpr double kKeepUnlabelled = 0.3;  // seconds that an unlabelled object is kept without evidence
@@ -22,16 +21,6 @@ constexpr float kDecay = 0.97F;          // of the confidence, per label
 bool covers(const MovableObject& object, const cv::Point2f& point) {
   const cv::Point pixel(static_cast<int>(point.x), static_cast<int>(point.y));
   return object.box.contains(pixel) && object.mask.at<std::uint8_t>(pixel - object.box.tl()) != 0;
-}
-
-std::vector<cv::Point2f> points_on(const MovableObject& object, const PastFrame& frame) {
-  std::vector<cv::Point2f> points;
-  for (const auto* list : {&frame.moving_points, &frame.points}) {
-    for (const auto& point : *list) {
-      if (covers(object, point)) points.push_back(point);
-    }
-  }
-  return thinned(points, kPointsPerObject);
 }
 
 // Similarity transform of the matches (RANSAC); the median translation if that fails.
@@ -90,30 +79,19 @@ bool move(MovableObject& object, const cv::Matx23d& motion, const cv::Size& imag
 
 std::vector<MovableObject> predicted_objects(const std::vector<MovableObject>& objects, const PastFrame& from,
                                              const PastFrame& to, const FlowConsistency& flow) {
-  std::vector<cv::Point2f> points;
-  std::vector<cv::Point2f> guess;
-  std::vector<std::size_t> owner;
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    for (const auto& point : points_on(objects[i], from)) {
-      points.push_back(point);
-      guess.push_back(flow.expected(from, to, point));
-      owner.push_back(i);
-    }
-  }
-  const auto found = track_points(from.pyramid, to.pyramid, points, guess);
+  const auto matches = common_corners(from, to);
   std::vector<MovableObject> result;
-  for (std::size_t i = 0; i < objects.size(); ++i) {
+  for (MovableObject object : objects) {
     std::vector<cv::Point2f> before;
     std::vector<cv::Point2f> after;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      if (owner[k] != i || !found[k]) continue;
-      before.push_back(points[k]);
-      after.push_back(*found[k]);
+    for (const CornerMatch& match : matches) {
+      if (!covers(object, match.from->pixel)) continue;
+      before.push_back(match.from->pixel);
+      after.push_back(match.to->pixel);
     }
-    MovableObject object = objects[i];
     const auto motion =
         before.size() >= kMinFlowPoints ? similarity(before, after) : camera_motion(object, from, to, flow);
-    if (move(object, motion, to.pyramid[0].size())) result.push_back(std::move(object));
+    if (move(object, motion, to.pyramid.image)) result.push_back(std::move(object));
   }
   return result;
 }

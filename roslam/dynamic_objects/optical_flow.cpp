@@ -1,58 +1,143 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/dynamic_objects/optical_flow.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
+#include <utility>
 
 namespace roslam {
 
 namespace {
-constexpr int kLevels = 3;          // above the full image
-constexpr int kWindow = 13;         // pixels
+constexpr int kHalved = 480;        // columns of images from which on flow is computed at half the resolution
+constexpr int kLevels = 2;          // above the first
 constexpr float kMaxReturn = 1.0F;  // pixels; limit of the forward-backward error
-constexpr double kMinEigenvalue = 1e-3;
+
+// Square blocks of the image, so many along a row, and which of them hold a corner.
+class Blocks {
+ public:
+  Blocks(const Camera& camera, int columns)
+      : side_(std::max(1, camera.width / columns)),
+        size_(camera.width / side_ + 1, camera.height / side_ + 1) {}
+
+  cv::Mat none() const { return cv::Mat::zeros(size_, CV_8UC1); }
+
+  // False if the block of that pixel was taken before.
+  bool take(const cv::Point2f& pixel, cv::Mat& taken) const {
+    const cv::Point block(static_cast<int>(pixel.x) / side_, static_cast<int>(pixel.y) / side_);
+    return std::exchange(taken.at<std::uint8_t>(block), std::uint8_t{1}) == 0;
+  }
+
+ private:
+  int side_;
+  cv::Size size_;
+};
+
+std::vector<cv::Point2f> scaled(std::vector<cv::Point2f> points, float factor) {
+  for (cv::Point2f& point : points) point *= factor;
+  return points;
+}
+
+// Moves the guesses to where the points are found, from that pyramid level on.
+std::vector<std::uint8_t> lucas_kanade(const FlowPyramid& from, const FlowPyramid& to,
+                                       const std::vector<cv::Point2f>& points,
+                                       std::vector<cv::Point2f>& guess, int level) {
+  std::vector<std::uint8_t> found;
+  if (points.empty()) return found;
+  const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 12, 0.03);
+  constexpr double kMinEigenvalue = 1e-3;
+  guess = scaled(std::move(guess), 1.0F / from.scale);
+  cv::calcOpticalFlowPyrLK(from.levels, to.levels, scaled(points, 1.0F / from.scale), guess, found,
+                           cv::noArray(), {from.window, from.window}, level, criteria,
+                           cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  guess = scaled(std::move(guess), to.scale);
+  return found;
+}
 }  // namespace
 
-std::vector<cv::Mat> flow_pyramid(const cv::Mat& grey) {
-  std::vector<cv::Mat> pyramid;
-  cv::buildOpticalFlowPyramid(grey, pyramid, {kWindow, kWindow}, kLevels, true);
+std::vector<CornerMatch> common_corners(const PastFrame& from, const PastFrame& to) {
+  std::vector<CornerMatch> matches;
+  auto past = from.corners.begin();
+  for (const Corner& corner : to.corners) {
+    while (past != from.corners.end() && past->track < corner.track) ++past;
+    if (past == from.corners.end()) break;
+    if (past->track == corner.track) matches.push_back({&*past, &corner});
+  }
+  return matches;
+}
+
+FlowPyramid flow_pyramid(const cv::Mat& grey) {
+  FlowPyramid pyramid;
+  pyramid.image = grey.size();
+  cv::Mat first = grey;
+  // Flow is compared within more than a pixel, for which half the resolution of usual images suffices.
+  if (grey.cols >= kHalved) {
+    cv::pyrDown(grey, first);
+    pyramid.scale = 2.0F;
+    pyramid.window = 9;
+  }
+  cv::buildOpticalFlowPyramid(first, pyramid.levels, {pyramid.window, pyramid.window}, kLevels, true);
   return pyramid;
 }
 
-std::vector<std::optional<cv::Point2f>> track_points(const std::vector<cv::Mat>& from,
-                                                     const std::vector<cv::Mat>& to,
+std::vector<std::optional<cv::Point2f>> track_points(const FlowPyramid& from, const FlowPyramid& to,
                                                      const std::vector<cv::Point2f>& points,
                                                      const std::vector<cv::Point2f>& guess) {
+  std::vector<cv::Point2f> forward = guess;
+  const auto found = lucas_kanade(from, to, points, forward, kLevels);
+  const cv::Rect2f image(0.0F, 0.0F, static_cast<float>(to.image.width), static_cast<float>(to.image.height));
   std::vector<std::optional<cv::Point2f>> result(points.size());
-  if (points.empty()) return result;
-  const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 12, 0.03);
-  std::vector<cv::Point2f> forward = guess.empty() ? points : guess;
-  std::vector<cv::Point2f> backward = points;
-  std::vector<std::uint8_t> found;
-  std::vector<std::uint8_t> returned;
-  std::vector<float> error;
-  constexpr int kFlags = cv::OPTFLOW_USE_INITIAL_FLOW;
-  cv::calcOpticalFlowPyrLK(from, to, points, forward, found, error, {kWindow, kWindow}, kLevels, criteria,
-                           kFlags, kMinEigenvalue);
-  // The backward pass starts near its solution, so that the finest level suffices.
-  cv::calcOpticalFlowPyrLK(to, from, forward, backward, returned, error, {kWindow, kWindow}, 0, criteria,
-                           kFlags, kMinEigenvalue);
-  const cv::Rect2f image(0.0F, 0.0F, static_cast<float>(to[0].cols), static_cast<float>(to[0].rows));
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const cv::Point2f error_back = backward[i] - points[i];
-    const bool good = found[i] != 0 && returned[i] != 0 && image.contains(forward[i]) &&
-                      std::hypot(error_back.x, error_back.y) <= kMaxReturn;
-    if (good) result[i] = forward[i];
+    if (found[i] != 0 && image.contains(forward[i])) result[i] = forward[i];
   }
   return result;
 }
 
-std::vector<cv::Point2f> thinned(const std::vector<cv::Point2f>& points, std::size_t wanted) {
-  if (points.size() <= wanted) return points;
-  std::vector<cv::Point2f> result;
-  result.reserve(wanted);
-  for (std::size_t i = 0; i < wanted; ++i) result.push_back(points[i * points.size() / wanted]);
+std::vector<bool> are_tracked_back(const FlowPyramid& from, const FlowPyramid& to,
+                                   const std::vector<CornerMatch>& matches) {
+  std::vector<cv::Point2f> found;
+  std::vector<cv::Point2f> backward;
+  for (const CornerMatch& match : matches) {
+    found.push_back(match.to->pixel);
+    backward.push_back(match.from->pixel);
+  }
+  // It starts near its solution, so that the finest level suffices.
+  const auto returned = lucas_kanade(to, from, found, backward, 0);
+  std::vector<bool> result(matches.size());
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const cv::Point2f error = backward[i] - matches[i].from->pixel;
+    result[i] = returned[i] != 0 && std::hypot(error.x, error.y) <= kMaxReturn;
+  }
   return result;
+}
+
+void CornerSelection::replenish(std::vector<Corner>& corners, const std::vector<cv::Point2f>& points,
+                                bool is_removed) {
+  const Blocks fine(camera_, 80);
+  // Corners of objects are denser, as few pixels must show how an object moves.
+  const Blocks blocks = is_removed ? fine : Blocks(camera_, 40);
+  const std::size_t most = is_removed ? 250 : 400;
+  cv::Mat crowded = fine.none();
+  cv::Mat taken = blocks.none();
+  std::size_t count = 0;
+  std::erase_if(corners, [&](const Corner& corner) {
+    if (corner.is_removed != is_removed) return false;
+    if (count >= most || !fine.take(corner.pixel, crowded)) return true;
+    blocks.take(corner.pixel, taken);
+    ++count;
+    return false;
+  });
+  std::vector<cv::Point2f> free;
+  std::copy_if(points.begin(), points.end(), std::back_inserter(free),
+               [&](const cv::Point2f& point) { return blocks.take(point, taken); });
+  const std::size_t added = std::min(free.size(), most - count);
+  for (std::size_t i = 0; i < added; ++i) {
+    const cv::Point2f& pixel = free[i * free.size() / added];  // evenly spaced in their order
+    corners.push_back({++last_track_, pixel, camera_.undistort({pixel.x, pixel.y}), is_removed});
+  }
 }
 
 }  // namespace roslam

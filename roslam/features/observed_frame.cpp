@@ -8,24 +8,24 @@
 
 namespace roslam {
 
-namespace {
-bool is_known(float depth, const DepthOptions& options) {
-  return std::isfinite(depth) && depth >= options.min_depth && depth <= options.max_depth;
-}
-}  // namespace
-
 float depth_at(const cv::Mat& depth, const cv::Point2f& pixel, const DepthOptions& options) {
-  const int x = static_cast<int>(std::lround(pixel.x));
-  const int y = static_cast<int>(std::lround(pixel.y));
+  const int x = cvRound(pixel.x);
+  const int y = cvRound(pixel.y);
   if (x < 0 || y < 0 || x >= depth.cols || y >= depth.rows) return 0.0F;
-  const float centre = depth.at<float>(y, x);
-  if (!is_known(centre, options)) return 0.0F;
-  const float tolerance = static_cast<float>(options.edge_ratio + options.edge_growth * centre) * centre;
-  for (int ny = std::max(0, y - 1); ny <= std::min(depth.rows - 1, y + 1); ++ny) {
-    for (int nx = std::max(0, x - 1); nx <= std::min(depth.cols - 1, x + 1); ++nx) {
-      const float neighbour = depth.at<float>(ny, nx);
-      if (is_known(neighbour, options) && std::abs(neighbour - centre) > tolerance) return 0.0F;
-    }
+  const auto least = static_cast<float>(options.min_depth);
+  const auto most = static_cast<float>(options.max_depth);
+  const auto is_known = [=](float z) { return z >= least && z <= most; };
+  const float centre = depth.ptr<float>(y)[x];
+  if (!is_known(centre)) return 0.0F;
+  const auto tolerance = static_cast<float>(options.edge_ratio + options.edge_growth * centre) * centre;
+  const auto differs = [&](int ny, int nx) {
+    const float z = depth.ptr<float>(ny)[nx];
+    return is_known(z) && std::abs(z - centre) > tolerance;
+  };
+  const int left = std::max(0, x - 1);
+  const int right = std::min(depth.cols - 1, x + 1);
+  for (const int ny : {std::max(0, y - 1), y, std::min(depth.rows - 1, y + 1)}) {
+    if (differs(ny, left) || differs(ny, x) || differs(ny, right)) return 0.0F;
   }
   return centre;
 }
