@@ -49,12 +49,13 @@ DynamicObjectDetector::DynamicObjectDetector(const Camera& camera, const Setting
 
 DynamicObjects DynamicObjectDetector::detect(const Frame& frame, const cv::Mat& grey,
                                              const std::optional<SE3>& predicted_T_camera_world,
-                                             const std::optional<LabelledFrame>& labels) {
+                                             const std::optional<LabelledFrame>& labels,
+                                             bool examine_geometry) {
   const DynamicObjectOptions& options = settings_.dynamic_objects;
   begin_frame(frame, grey, predicted_T_camera_world);
   if (!options.carry) object_tracker_.clear();
   if (!past_.empty()) object_tracker_.carry(past_.back(), current_, flow_);
-  CellScene scene = gather_evidence();
+  CellScene scene = gather_evidence(examine_geometry);
   const std::vector<MovableObject> propagated = object_tracker_.objects();
   if (options.labels && labels) {
     if (auto objects = labelled_objects(*labels)) {
@@ -68,7 +69,7 @@ DynamicObjects DynamicObjectDetector::detect(const Frame& frame, const cv::Mat& 
     const cv::Mat barrier = scene.cells_that_are(MotionEvidence::kStatic);
     grow_masks(scene.owners, {depth_cells_, barrier, scene.seeds, scene.moving}, grid_, options.growth);
   }
-  if (options.depth_consistency || options.flow) add_unlabelled(scene);
+  if (examine_geometry && (options.depth_consistency || options.flow)) add_unlabelled(scene);
   DynamicObjects dynamic_objects = compose_masks(scene);
   mask_ = dynamic_objects.mask;
   return dynamic_objects;
@@ -82,17 +83,17 @@ void DynamicObjectDetector::begin_frame(const Frame& frame, const cv::Mat& grey,
   if (!past_.empty()) pose_from_flow_ = flow_.track(past_.back(), current_);
 }
 
-CellScene DynamicObjectDetector::gather_evidence() {
+CellScene DynamicObjectDetector::gather_evidence(bool examine_geometry) {
   const DynamicObjectOptions& options = settings_.dynamic_objects;
   CellScene scene;
   scene.depth = depth_cells_;
-  if (options.depth_consistency && current_.T_camera_world) {
+  if (examine_geometry && options.depth_consistency && current_.T_camera_world) {
     scene.depth_evidence =
         history_.examine(grid_, depth_cells_, *current_.T_camera_world, current_.timestamp);
   } else {
     scene.depth_evidence = {cv::Mat::zeros(grid_.size(), CV_8UC1), cv::Mat::zeros(grid_.size(), CV_32FC1)};
   }
-  if (const PastFrame* past = options.flow ? flow_reference() : nullptr) {
+  if (const PastFrame* past = examine_geometry && options.flow ? flow_reference() : nullptr) {
     scene.flow = flow_.follow(*past, current_);
     reject_contradicted_motion(scene);
   }

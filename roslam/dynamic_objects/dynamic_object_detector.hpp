@@ -47,7 +47,7 @@ class DynamicObjectDetector {
   /// new ones of this or an earlier frame, if any. Frames must come in order.
   DynamicObjects detect(const Frame& frame, const cv::Mat& grey,
                         const std::optional<SE3>& predicted_T_camera_world,
-                        const std::optional<LabelledFrame>& labels);
+                        const std::optional<LabelledFrame>& labels, bool examine_geometry = true);
 
   /// Stores the frame last detected in for later ones: its pose, if tracked, and the corners (pixels, as
   /// taken) outside and inside the mask.
@@ -71,7 +71,7 @@ class DynamicObjectDetector {
  private:
   void begin_frame(const Frame& frame, const cv::Mat& grey,
                    const std::optional<SE3>& predicted_T_camera_world);
-  CellScene gather_evidence();
+  CellScene gather_evidence(bool examine_geometry);
   void reject_contradicted_motion(CellScene& scene) const;
   std::optional<std::vector<MovableObject>> labelled_objects(const LabelledFrame& labels);
   void assess_objects(CellScene& scene);
