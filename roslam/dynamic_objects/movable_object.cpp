@@ -60,20 +60,21 @@ cv::Mat kinds_of_labels() {
 float confidence_of(const MovableObject& object, const Segmentation& segmentation) {
   const cv::Mat& probability = segmentation.probability;
   const cv::Size size = segmentation.labels.size();
+  std::vector<int> columns;  // of the probability map, for each column of the box
+  for (int x = object.box.x; x < object.box.br().x; ++x) columns.push_back(x * probability.cols / size.width);
   double sum = 0.0;
   int count = 0;
   for (int y = 0; y < object.box.height; ++y) {
     const auto* mask = object.mask.ptr<std::uint8_t>(y);
-    const auto* labels = segmentation.labels.ptr<std::uint8_t>(object.box.y + y) + object.box.x;
+    const int row = object.box.y + y;
+    const auto* labels = segmentation.labels.ptr<std::uint8_t>(row) + object.box.x;
+    const float* line =
+        probability.empty() ? nullptr : probability.ptr<float>(row * probability.rows / size.height);
     for (int x = 0; x < object.box.width; ++x) {
       if (mask[x] == 0 || labels[x] >= kClasses) continue;
-      if (probability.empty()) {
-        sum += segmentation.confidence[labels[x]];
-      } else {
-        const int row = (object.box.y + y) * probability.rows / size.height;
-        const int column = (object.box.x + x) * probability.cols / size.width;
-        sum += static_cast<double>(probability.at<float>(row, column));
-      }
+      const float share =
+          line == nullptr ? segmentation.confidence[labels[x]] : line[columns[static_cast<std::size_t>(x)]];
+      sum += static_cast<double>(share);
       ++count;
     }
   }
