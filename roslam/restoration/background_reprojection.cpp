@@ -3,14 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>
 
 #include "roslam/common/error.hpp"
+#include "roslam/restoration/colour_samples.hpp"
 #include "roslam/restoration/image_alignment.hpp"
 #include "roslam/restoration/source_selection.hpp"
+#include "roslam/restoration/warp_group.hpp"
 
 namespace roslam {
 
@@ -43,17 +44,6 @@ struct Blend {
   float certainty = 0.0F;
 };
 
-// A pixel's colour in one source.
-struct ColourSample {
-  cv::Vec3f colour;
-  float weight;
-  float age;
-};
-
-float difference(const cv::Vec3f& a, const cv::Vec3f& b) {
-  return (std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2])) / 3.0F;
-}
-
 // Fills the pixels of one target.
 class PixelFiller {
  public:
@@ -61,17 +51,18 @@ class PixelFiller {
               const cv::Rect& box)
       : rays_(rays),
         warps_(warps),
-        options_(options),
         box_(box),
         measured_(warps.size()),
-        completed_(warps.size()) {
+        completed_(warps.size()),
+        group_(rays, warps),
+        samples_(static_cast<float>(options.colour_tolerance)) {
     for (std::size_t i = 0; i < warps.size(); ++i) warps[i].splat(box, measured_[i], completed_[i]);
   }
 
   void fill(int x, int y, ReprojectedArea& area) {
     const PixelSurface surface = surface_at(x, y);
     if (surface.depth == 0.0F) return;
-    const auto blend = blend_at(rays_.point(x, y, surface.depth));
+    const auto blend = blended();
     if (!blend) return;
     area.filled.at<std::uint8_t>(y, x) = 255;
     area.colour.at<cv::Vec3b>(y, x) = blend->colour;
@@ -91,46 +82,48 @@ class PixelFiller {
   const std::vector<float>& depths_at(const std::vector<cv::Mat>& splats, int x, int y) {
     depths_.clear();
     for (const cv::Mat& splat : splats)
-      if (const float depth = splat.at<float>(y - box_.y, x - box_.x); depth > 0.0F) depths_.push_back(depth);
+      if (const float depth = splat.ptr<float>(y - box_.y + 1)[x - box_.x + 1]; std::isfinite(depth))
+        depths_.push_back(depth);
     std::sort(depths_.begin(), depths_.end());
     return depths_;
   }
 
-  // The nearest cluster of depths that more sources support than see through; 0 = none.
-  float nearest_supported(const std::vector<float>& depths, int x, int y) const {
+  // The nearest cluster of depths that more sources support than see through; 0 = none. Of all points it is
+  // the one projected last.
+  float nearest_supported(const std::vector<float>& depths, int x, int y) {
     for (std::size_t first = 0; first < depths.size();) {
       const float limit = depths[first] + 2.0F * warps_.front().tolerance(depths[first]);
       std::size_t last = first;
       while (last < depths.size() && depths[last] <= limit) ++last;
       const float depth = depths[first + (last - first) / 2];
-      const Eigen::Vector3f point = rays_.point(x, y, depth);
-      const auto contradicting =
-          static_cast<std::size_t>(std::count_if(warps_.begin(), warps_.end(), [&](const SourceWarp& warp) {
-            const auto warped = warp.project(point);
-            return warped && warp.sees_through(*warped);
-          }));
+      const auto& warped = group_.project(rays_.point(x, y, depth));
+      std::size_t contradicting = 0;
+      for (std::size_t i = 0; i < warped.size(); ++i)
+        contradicting += warps_[i].sees_through(warped[i]) ? 1 : 0;
       if (contradicting < last - first) return depth;
       first = last;
     }
     return 0.0F;
   }
 
-  std::optional<Blend> blend_at(const Eigen::Vector3f& point) {
+  // Blends what the sources show of the point projected last.
+  std::optional<Blend> blended() {
+    const auto& warped = group_.warped();
+    const auto& weights = group_.weights();
     samples_.clear();
-    for (const SourceWarp& warp : warps_) {
-      const auto warped = warp.project(point);
-      if (!warped || !warp.shows(*warped)) continue;
-      const float weight =
-          warp.weight(point, warped->depth) * (warped->is_measured ? 1.0F : kCompletedWeight);
-      samples_.push_back({warp.colour(warped->pixel), weight, warp.age()});
+    for (std::size_t i = 0; i < warped.size(); ++i) {
+      const SourceWarp& warp = warps_[i];
+      if (!warp.shows(warped[i])) continue;
+      const float weight = number_of(weights, i) * (warped[i].is_measured ? 1.0F : kCompletedWeight);
+      samples_.add({warp.colour(warped[i].pixel), weight, warp.age()});
     }
-    if (samples_.empty()) return std::nullopt;
-    const ColourSample& typical = consensus();
+    if (samples_.all().empty()) return std::nullopt;
+    const ColourSample typical = samples_.consensus();
     cv::Vec3f colour;
     float age = 0.0F, sum = 0.0F, agreeing = 0.0F, all = 0.0F;
-    for (const ColourSample& sample : samples_) {
+    for (const ColourSample& sample : samples_.all()) {
       all += sample.weight;
-      if (difference(sample.colour, typical.colour) > options_.colour_tolerance) continue;
+      if (!samples_.agree(sample, typical)) continue;
       // Squared, because averaging blurs: the best source should dominate.
       const float weight = sample.weight * sample.weight;
       colour += weight * sample.colour;
@@ -142,42 +135,13 @@ class PixelFiller {
     return Blend{colour / sum, age / sum, agreeing / all * agreeing / (agreeing + kHalfCertainty)};
   }
 
-  // The weighted medoid of the colours, or, if most sources differ from it, the unweighted one: a shadow or
-  // a missed dynamic object may dominate the sources close in time, but not all of them.
-  const ColourSample& consensus() const {
-    const ColourSample& weighted = medoid([](const ColourSample& other) { return other.weight; });
-    const float limit = 2.0F * static_cast<float>(options_.colour_tolerance);
-    const auto agreeing = std::count_if(samples_.begin(), samples_.end(), [&](const ColourSample& other) {
-      return difference(weighted.colour, other.colour) <= limit;
-    });
-    if (2 * agreeing >= static_cast<std::ptrdiff_t>(samples_.size())) return weighted;
-    return medoid([](const ColourSample&) { return 1.0F; });
-  }
-
-  template <typename Weight>
-  const ColourSample& medoid(const Weight& weight_of) const {
-    const auto limit = 2.0F * static_cast<float>(options_.colour_tolerance);
-    const ColourSample* best = &samples_.front();
-    float least = std::numeric_limits<float>::max();
-    for (const ColourSample& one : samples_) {
-      float cost = 0.0F;
-      for (const ColourSample& other : samples_)
-        cost += weight_of(other) * std::min(difference(one.colour, other.colour), limit);
-      if (cost < least) {
-        least = cost;
-        best = &one;
-      }
-    }
-    return *best;
-  }
-
   const PixelRays& rays_;
   const std::vector<SourceWarp>& warps_;
-  const ReprojectionOptions& options_;
   cv::Rect box_;
   std::vector<cv::Mat> measured_, completed_;  // CV_32FC1 depth of each source, warped into the box
-  std::vector<float> depths_;                  // scratch
-  std::vector<ColourSample> samples_;          // scratch
+  WarpGroup group_;
+  ColourSamples samples_;
+  std::vector<float> depths_;  // scratch
 };
 }  // namespace
 
