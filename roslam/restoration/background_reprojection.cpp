@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "roslam/restoration/image_alignment.hpp"
 #include "roslam/restoration/source_selection.hpp"
 #include "roslam/restoration/warp_group.hpp"
+#include "roslam/restoration/warped_depths.hpp"
 
 namespace roslam {
 
@@ -48,16 +50,12 @@ struct Blend {
 class PixelFiller {
  public:
   PixelFiller(const PixelRays& rays, const std::vector<SourceWarp>& warps, const ReprojectionOptions& options,
-              const cv::Rect& box)
+              const cv::Mat& area)
       : rays_(rays),
         warps_(warps),
-        box_(box),
-        measured_(warps.size()),
-        completed_(warps.size()),
+        depths_(rays, warps, area),
         group_(rays, warps),
-        samples_(static_cast<float>(options.colour_tolerance)) {
-    for (std::size_t i = 0; i < warps.size(); ++i) warps[i].splat(box, measured_[i], completed_[i]);
-  }
+        samples_(static_cast<float>(options.colour_tolerance)) {}
 
   void fill(int x, int y, ReprojectedArea& area) {
     const PixelSurface surface = surface_at(x, y);
@@ -73,19 +71,18 @@ class PixelFiller {
 
  private:
   PixelSurface surface_at(int x, int y) {
-    if (const float depth = nearest_supported(depths_at(measured_, x, y), x, y); depth > 0.0F)
+    if (const float depth = nearest_supported(sorted(depths_.measured(x, y)), x, y); depth > 0.0F)
       return {depth, true};
-    return {nearest_supported(depths_at(completed_, x, y), x, y), false};
+    return {nearest_supported(sorted(depths_.completed(x, y)), x, y), false};
   }
 
-  // The sources' depths at a pixel, nearest first.
-  const std::vector<float>& depths_at(const std::vector<cv::Mat>& splats, int x, int y) {
-    depths_.clear();
-    for (const cv::Mat& splat : splats)
-      if (const float depth = splat.ptr<float>(y - box_.y + 1)[x - box_.x + 1]; std::isfinite(depth))
-        depths_.push_back(depth);
-    std::sort(depths_.begin(), depths_.end());
-    return depths_;
+  // Known depths, nearest first.
+  const std::vector<float>& sorted(std::span<const float> depths) {
+    sorted_.clear();
+    for (const float depth : depths)
+      if (depth < std::numeric_limits<float>::infinity()) sorted_.push_back(depth);
+    std::sort(sorted_.begin(), sorted_.end());
+    return sorted_;
   }
 
   // The nearest cluster of depths that more sources support than see through; 0 = none. Of all points it is
@@ -109,7 +106,7 @@ class PixelFiller {
   // Blends what the sources show of the point projected last.
   std::optional<Blend> blended() {
     const auto& warped = group_.warped();
-    const auto& weights = group_.weights();
+    const auto& weights = group_.weights_nearby();
     samples_.clear();
     for (std::size_t i = 0; i < warped.size(); ++i) {
       const SourceWarp& warp = warps_[i];
@@ -118,12 +115,13 @@ class PixelFiller {
       samples_.add({warp.colour(warped[i].pixel), weight, warp.age()});
     }
     if (samples_.all().empty()) return std::nullopt;
-    const ColourSample typical = samples_.consensus();
+    const bool all_agree = samples_.all_agree();
+    const ColourSample typical = all_agree ? samples_.all().front() : samples_.consensus();
     cv::Vec3f colour;
     float age = 0.0F, sum = 0.0F, agreeing = 0.0F, all = 0.0F;
     for (const ColourSample& sample : samples_.all()) {
       all += sample.weight;
-      if (!samples_.agree(sample, typical)) continue;
+      if (!all_agree && !samples_.agree(sample, typical)) continue;
       // Squared, because averaging blurs: the best source should dominate.
       const float weight = sample.weight * sample.weight;
       colour += weight * sample.colour;
@@ -137,11 +135,10 @@ class PixelFiller {
 
   const PixelRays& rays_;
   const std::vector<SourceWarp>& warps_;
-  cv::Rect box_;
-  std::vector<cv::Mat> measured_, completed_;  // CV_32FC1 depth of each source, warped into the box
+  WarpedDepths depths_;
   WarpGroup group_;
   ColourSamples samples_;
-  std::vector<float> depths_;  // scratch
+  std::vector<float> sorted_;  // scratch
 };
 }  // namespace
 
@@ -178,7 +175,7 @@ ReprojectedArea BackgroundReprojection::fill(const PosedImage& target, const cv:
   if (box.empty() || !target.T_world_camera) return result;
   const auto chosen = warps(target, area, sources);
   if (chosen.empty()) return result;
-  PixelFiller filler(rays_, chosen, options_, box);
+  PixelFiller filler(rays_, chosen, options_, area);
   for (int y = box.y; y < box.br().y; ++y)
     for (int x = box.x; x < box.br().x; ++x)
       if (area.at<std::uint8_t>(y, x) != 0) filler.fill(x, y, result);

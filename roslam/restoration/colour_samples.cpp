@@ -5,6 +5,17 @@
 
 namespace roslam {
 
+bool ColourSamples::all_agree() const {
+  cv::Vec3f least = samples_.front().colour, most = least;
+  for (const ColourSample& sample : samples_) {
+    for (int c = 0; c < 3; ++c) {
+      least[c] = std::min(least[c], sample.colour[c]);
+      most[c] = std::max(most[c], sample.colour[c]);
+    }
+  }
+  return difference(least, most) <= tolerance_;
+}
+
 const ColourSample& ColourSamples::consensus() {
   for (auto* channel : {&blue_, &green_, &red_, &cost_})
     channel->assign(fours_for(samples_.size()), Four::Zero());

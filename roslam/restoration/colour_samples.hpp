@@ -29,6 +29,9 @@ class ColourSamples {
     return difference(a.colour, b.colour) <= tolerance_;
   }
 
+  /// Whether any two of the colours are sure to agree.
+  bool all_agree() const;
+
   /// The weighted medoid of the colours, or, if most sources differ from it, the unweighted one: a shadow or
   /// a missed dynamic object may dominate the sources close in time, but not all of them. There must be a
   /// sample.

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "roslam/common/upper_median.hpp"
@@ -19,35 +18,6 @@ constexpr int kDarkest = 12, kBrightest = 243;  // beyond these a pixel is under
 bool is_well_exposed(const cv::Vec3b& colour) {
   return *std::min_element(colour.val, colour.val + 3) >= kDarkest &&
          *std::max_element(colour.val, colour.val + 3) <= kBrightest;
-}
-
-// Points of a row of pixels, by coordinate.
-struct PointRow {
-  explicit PointRow(int width) : x(static_cast<std::size_t>(width)), y(x.size()), z(x.size()) {}
-  std::vector<float> x, y, z;
-};
-
-// The points that a row of pixels shows at the given depths, moved. The compiler vectorises the loop.
-void move_points(const SE3f& motion, const cv::Vec2f* rays, const float* depths, PointRow& points) {
-  const Eigen::Matrix3f& R = motion.rotation;
-  const Eigen::Vector3f& t = motion.translation;
-  const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2), t0 = t(0);
-  const float r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2), t1 = t(1);
-  const float r20 = R(2, 0), r21 = R(2, 1), r22 = R(2, 2), t2 = t(2);
-  float *to_x = points.x.data(), *to_y = points.y.data(), *to_z = points.z.data();
-  const float* ray = rays->val;
-  for (std::size_t i = 0; i < points.z.size(); ++i) {
-    const float z = depths[i], x = ray[2 * i] * z, y = ray[2 * i + 1] * z;
-    to_x[i] = r00 * x + (r01 * y + r02 * z) + t0;
-    to_y[i] = r10 * x + (r11 * y + r12 * z) + t1;
-    to_z[i] = r20 * x + (r21 * y + r22 * z) + t2;
-  }
-}
-
-// A reading is splatted to the four pixels around it, so that a source a little farther away leaves no gaps.
-void keep_nearest(float* corner, std::size_t stride, float depth) {
-  for (float* kept : {corner, corner + 1, corner + stride, corner + stride + 1})
-    *kept = std::min(*kept, depth);
 }
 }  // namespace
 
@@ -99,32 +69,6 @@ cv::Vec3f SourceWarp::colour(const Eigen::Vector2f& pixel) const {
     result[c] = gain_[c] * (upper + low * (lower - upper));
   }
   return result;
-}
-
-void SourceWarp::splat(const cv::Rect& area, cv::Mat& measured, cv::Mat& completed) const {
-  const cv::Size size(area.width + 2, area.height + 2);
-  const cv::Scalar none(std::numeric_limits<float>::infinity());
-  measured = cv::Mat(size, CV_32FC1, none);
-  completed = cv::Mat(size, CV_32FC1, none);
-  PointRow points(source_->depth.cols);
-  // Of the pixels (x, y) around which all four pixels are in the images.
-  const auto left = static_cast<float>(area.x - 1), top = static_cast<float>(area.y - 1);
-  const auto right = static_cast<float>(area.br().x), bottom = static_cast<float>(area.br().y);
-  for (int y = 0; y < source_->depth.rows; ++y) {
-    const float* depths = source_->depth.ptr<float>(y);
-    const auto* is_measured = source_->is_measured.ptr<std::uint8_t>(y);
-    move_points(target_from_source_, rays_->row(y), depths, points);
-    rays_->pixels(points.z.size(), points.x.data(), points.y.data(), points.z.data());
-    for (std::size_t x = 0; x < points.z.size(); ++x) {
-      const float to_x = points.x[x], to_y = points.y[x];
-      if (!(to_x >= 0.0F) || to_x < left || to_x >= right || to_y < top || to_y >= bottom) continue;
-      if (depths[x] == 0.0F) continue;
-      cv::Mat& image = is_measured[x] != 0 ? measured : completed;
-      float* corner =
-          image.ptr<float>(static_cast<int>(to_y) - area.y + 1) + static_cast<int>(to_x) - area.x + 1;
-      keep_nearest(corner, image.step1(), points.z[x]);
-    }
-  }
 }
 
 void SourceWarp::match_exposure(const PosedImage& target, const cv::Mat& free) {

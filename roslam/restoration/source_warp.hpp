@@ -59,10 +59,6 @@ class SourceWarp {
   /// Bilinearly interpolated colour (BGR) at a pixel of the source, times the exposure gain to the target.
   cv::Vec3f colour(const Eigen::Vector2f& pixel) const;
 
-  /// Forward-warps the source's static depth into an area of the target image (CV_32FC1 metres, infinite =
-  /// none): measured and filled-in depth separately. Both images have a border of a pixel around the area.
-  void splat(const cv::Rect& area, cv::Mat& measured, cv::Mat& completed) const;
-
   /// Estimates the exposure gain of each channel, the median ratio over pixels that both images show. free:
   /// CV_8UC1, nonzero where the target shows the static scene. The gain stays 1 with too few such pixels.
   void match_exposure(const PosedImage& target, const cv::Mat& free);
@@ -72,6 +68,7 @@ class SourceWarp {
   float angle_scale() const { return angle_scale_; }         ///< radians
   const Eigen::Vector3f& centre() const { return centre_; }  ///< of the source camera, in the target's frame
   const SE3f& source_from_target() const { return source_from_target_; }
+  const SE3f& target_from_source() const { return target_from_source_; }
   const SourceImage& source() const { return *source_; }
 
  private:

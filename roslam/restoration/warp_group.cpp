@@ -63,7 +63,15 @@ const std::vector<WarpedPoint>& WarpGroup::project(const Eigen::Vector3f& point)
   return warped_;
 }
 
+const std::vector<Four>& WarpGroup::weights_nearby() {
+  constexpr float kNearby = 0.01F;  // relative to the depth: half a degree
+  const float limit = kNearby * point_.z();
+  const bool is_nearby = (point_ - weighted_).squaredNorm() < limit * limit;
+  return is_nearby ? weights_ : weights();
+}
+
 const std::vector<Four>& WarpGroup::weights() {
+  weighted_ = point_;
   const float length = point_.norm();
   for (std::size_t i = 0; i < fours_.size(); ++i) {
     const Warps& four = fours_[i];

@@ -24,9 +24,12 @@ class WarpGroup {
   /// What project() returned last.
   const std::vector<WarpedPoint>& warped() const { return warped_; }
 
-  /// SourceWarp::weight() of each warp, to 1e-5, for the point projected last. Those of sources that the
-  /// point lies outside of have no meaning.
+  /// SourceWarp::weight() of each warp, to 1e-5, for the point projected last; those of sources that the
+  /// point lies behind have no meaning.
   const std::vector<Four>& weights();
+
+  /// weights(), or those computed last if the point is near that of those: weights change slowly.
+  const std::vector<Four>& weights_nearby();
 
  private:
   struct Warps {
@@ -44,6 +47,7 @@ class WarpGroup {
   std::vector<Four> depth_;  // z, metres
   std::vector<WarpedPoint> warped_;
   std::vector<Four> weights_;
+  Eigen::Vector3f weighted_ = Eigen::Vector3f::Zero();  // the point of the weights
 };
 
 }  // namespace roslam
