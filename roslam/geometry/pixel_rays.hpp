@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <opencv2/core.hpp>
 #include <optional>
 
@@ -30,6 +31,10 @@ class PixelRays {
   /// Projects a point of the camera frame to a pixel of the raw (distorted) image. Nothing if the point lies
   /// behind the camera, nearer than 5 cm, or beyond the centres of the outermost pixels.
   std::optional<Eigen::Vector2f> pixel(const Eigen::Vector3f& point) const;
+
+  /// pixel() of many points, given by coordinate and overwritten: x and y become the pixel, x becomes
+  /// negative where pixel() gives nothing.
+  void pixels(std::size_t count, float* x, float* y, const float* z) const;
 
  private:
   Camera camera_;

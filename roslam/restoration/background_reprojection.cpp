@@ -9,8 +9,11 @@
 #include <string>
 
 #include "roslam/common/error.hpp"
+#include "roslam/restoration/colour_samples.hpp"
 #include "roslam/restoration/image_alignment.hpp"
 #include "roslam/restoration/source_selection.hpp"
+#include "roslam/restoration/warp_group.hpp"
+#include "roslam/restoration/warped_depths.hpp"
 
 namespace roslam {
 
@@ -43,35 +46,21 @@ struct Blend {
   float certainty = 0.0F;
 };
 
-// A pixel's colour in one source.
-struct ColourSample {
-  cv::Vec3f colour;
-  float weight;
-  float age;
-};
-
-float difference(const cv::Vec3f& a, const cv::Vec3f& b) {
-  return (std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2])) / 3.0F;
-}
-
 // Fills the pixels of one target.
 class PixelFiller {
  public:
   PixelFiller(const PixelRays& rays, const std::vector<SourceWarp>& warps, const ReprojectionOptions& options,
-              const cv::Rect& box)
+              const cv::Mat& area)
       : rays_(rays),
         warps_(warps),
-        options_(options),
-        box_(box),
-        measured_(warps.size()),
-        completed_(warps.size()) {
-    for (std::size_t i = 0; i < warps.size(); ++i) warps[i].splat(box, measured_[i], completed_[i]);
-  }
+        depths_(rays, warps, area),
+        group_(rays, warps),
+        samples_(static_cast<float>(options.colour_tolerance)) {}
 
   void fill(int x, int y, ReprojectedArea& area) {
     const PixelSurface surface = surface_at(x, y);
     if (surface.depth == 0.0F) return;
-    const auto blend = blend_at(rays_.point(x, y, surface.depth));
+    const auto blend = blended();
     if (!blend) return;
     area.filled.at<std::uint8_t>(y, x) = 255;
     area.colour.at<cv::Vec3b>(y, x) = blend->colour;
@@ -82,55 +71,57 @@ class PixelFiller {
 
  private:
   PixelSurface surface_at(int x, int y) {
-    if (const float depth = nearest_supported(depths_at(measured_, x, y), x, y); depth > 0.0F)
+    if (const float depth = nearest_supported(sorted(depths_.measured(x, y)), x, y); depth > 0.0F)
       return {depth, true};
-    return {nearest_supported(depths_at(completed_, x, y), x, y), false};
+    return {nearest_supported(sorted(depths_.completed(x, y)), x, y), false};
   }
 
-  // The sources' depths at a pixel, nearest first.
-  const std::vector<float>& depths_at(const std::vector<cv::Mat>& splats, int x, int y) {
-    depths_.clear();
-    for (const cv::Mat& splat : splats)
-      if (const float depth = splat.at<float>(y - box_.y, x - box_.x); depth > 0.0F) depths_.push_back(depth);
-    std::sort(depths_.begin(), depths_.end());
-    return depths_;
+  // Known depths, nearest first.
+  const std::vector<float>& sorted(std::span<const float> depths) {
+    sorted_.clear();
+    for (const float depth : depths)
+      if (depth < std::numeric_limits<float>::infinity()) sorted_.push_back(depth);
+    std::sort(sorted_.begin(), sorted_.end());
+    return sorted_;
   }
 
-  // The nearest cluster of depths that more sources support than see through; 0 = none.
-  float nearest_supported(const std::vector<float>& depths, int x, int y) const {
+  // The nearest cluster of depths that more sources support than see through; 0 = none. Of all points it is
+  // the one projected last.
+  float nearest_supported(const std::vector<float>& depths, int x, int y) {
     for (std::size_t first = 0; first < depths.size();) {
       const float limit = depths[first] + 2.0F * warps_.front().tolerance(depths[first]);
       std::size_t last = first;
       while (last < depths.size() && depths[last] <= limit) ++last;
       const float depth = depths[first + (last - first) / 2];
-      const Eigen::Vector3f point = rays_.point(x, y, depth);
-      const auto contradicting =
-          static_cast<std::size_t>(std::count_if(warps_.begin(), warps_.end(), [&](const SourceWarp& warp) {
-            const auto warped = warp.project(point);
-            return warped && warp.sees_through(*warped);
-          }));
+      const auto& warped = group_.project(rays_.point(x, y, depth));
+      std::size_t contradicting = 0;
+      for (std::size_t i = 0; i < warped.size(); ++i)
+        contradicting += warps_[i].sees_through(warped[i]) ? 1 : 0;
       if (contradicting < last - first) return depth;
       first = last;
     }
     return 0.0F;
   }
 
-  std::optional<Blend> blend_at(const Eigen::Vector3f& point) {
+  // Blends what the sources show of the point projected last.
+  std::optional<Blend> blended() {
+    const auto& warped = group_.warped();
+    const auto& weights = group_.weights_nearby();
     samples_.clear();
-    for (const SourceWarp& warp : warps_) {
-      const auto warped = warp.project(point);
-      if (!warped || !warp.shows(*warped)) continue;
-      const float weight =
-          warp.weight(point, warped->depth) * (warped->is_measured ? 1.0F : kCompletedWeight);
-      samples_.push_back({warp.colour(warped->pixel), weight, warp.age()});
+    for (std::size_t i = 0; i < warped.size(); ++i) {
+      const SourceWarp& warp = warps_[i];
+      if (!warp.shows(warped[i])) continue;
+      const float weight = number_of(weights, i) * (warped[i].is_measured ? 1.0F : kCompletedWeight);
+      samples_.add({warp.colour(warped[i].pixel), weight, warp.age()});
     }
-    if (samples_.empty()) return std::nullopt;
-    const ColourSample& typical = consensus();
+    if (samples_.all().empty()) return std::nullopt;
+    const bool all_agree = samples_.all_agree();
+    const ColourSample typical = all_agree ? samples_.all().front() : samples_.consensus();
     cv::Vec3f colour;
     float age = 0.0F, sum = 0.0F, agreeing = 0.0F, all = 0.0F;
-    for (const ColourSample& sample : samples_) {
+    for (const ColourSample& sample : samples_.all()) {
       all += sample.weight;
-      if (difference(sample.colour, typical.colour) > options_.colour_tolerance) continue;
+      if (!all_agree && !samples_.agree(sample, typical)) continue;
       // Squared, because averaging blurs: the best source should dominate.
       const float weight = sample.weight * sample.weight;
       colour += weight * sample.colour;
@@ -142,42 +133,12 @@ class PixelFiller {
     return Blend{colour / sum, age / sum, agreeing / all * agreeing / (agreeing + kHalfCertainty)};
   }
 
-  // The weighted medoid of the colours, or, if most sources differ from it, the unweighted one: a shadow or
-  // a missed dynamic object may dominate the sources close in time, but not all of them.
-  const ColourSample& consensus() const {
-    const ColourSample& weighted = medoid([](const ColourSample& other) { return other.weight; });
-    const float limit = 2.0F * static_cast<float>(options_.colour_tolerance);
-    const auto agreeing = std::count_if(samples_.begin(), samples_.end(), [&](const ColourSample& other) {
-      return difference(weighted.colour, other.colour) <= limit;
-    });
-    if (2 * agreeing >= static_cast<std::ptrdiff_t>(samples_.size())) return weighted;
-    return medoid([](const ColourSample&) { return 1.0F; });
-  }
-
-  template <typename Weight>
-  const ColourSample& medoid(const Weight& weight_of) const {
-    const auto limit = 2.0F * static_cast<float>(options_.colour_tolerance);
-    const ColourSample* best = &samples_.front();
-    float least = std::numeric_limits<float>::max();
-    for (const ColourSample& one : samples_) {
-      float cost = 0.0F;
-      for (const ColourSample& other : samples_)
-        cost += weight_of(other) * std::min(difference(one.colour, other.colour), limit);
-      if (cost < least) {
-        least = cost;
-        best = &one;
-      }
-    }
-    return *best;
-  }
-
   const PixelRays& rays_;
   const std::vector<SourceWarp>& warps_;
-  const ReprojectionOptions& options_;
-  cv::Rect box_;
-  std::vector<cv::Mat> measured_, completed_;  // CV_32FC1 depth of each source, warped into the box
-  std::vector<float> depths_;                  // scratch
-  std::vector<ColourSample> samples_;          // scratch
+  WarpedDepths depths_;
+  WarpGroup group_;
+  ColourSamples samples_;
+  std::vector<float> sorted_;  // scratch
 };
 }  // namespace
 
@@ -214,7 +175,7 @@ ReprojectedArea BackgroundReprojection::fill(const PosedImage& target, const cv:
   if (box.empty() || !target.T_world_camera) return result;
   const auto chosen = warps(target, area, sources);
   if (chosen.empty()) return result;
-  PixelFiller filler(rays_, chosen, options_, box);
+  PixelFiller filler(rays_, chosen, options_, area);
   for (int y = box.y; y < box.br().y; ++y)
     for (int x = box.x; x < box.br().x; ++x)
       if (area.at<std::uint8_t>(y, x) != 0) filler.fill(x, y, result);

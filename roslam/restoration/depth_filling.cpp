@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 namespace roslam {
 namespace {
@@ -23,17 +24,31 @@ class DepthPropagation {
     cv::blur(colour, smooth_, {5, 5});
   }
 
-  // Propagates known depth along a line of pixels from one border of the image to the opposite one.
-  void sweep(cv::Point at, const cv::Point& step) {
-    cv::Point known(-1, -1);
-    float distance = 0.0F;
-    for (const cv::Rect image({0, 0}, depth_.size()); image.contains(at); at += step) {
-      distance += 1.0F;
-      if (depth_.at<float>(at) > 0.0F) {
-        known = at;
-        distance = 0.0F;
-      } else if (known.x >= 0) {
-        propose(at, known, distance);
+  // Propagates known depth along a row, from the left (step 1) or from the right (step -1).
+  void sweep_row(int y, int step) {
+    const float* depth = depth_.ptr<float>(y);
+    int known = -1;
+    for (int x = step > 0 ? 0 : depth_.cols - 1; x >= 0 && x < depth_.cols; x += step) {
+      if (depth[x] > 0.0F) {
+        known = x;
+      } else if (known >= 0) {
+        propose({x, y}, {known, y}, std::abs(x - known));
+      }
+    }
+  }
+
+  // Along all columns, from above (step 1) or from below (step -1), row by row.
+  void sweep_columns(int step) {
+    std::vector<int> known(static_cast<std::size_t>(depth_.cols), -1);  // row
+    for (int y = step > 0 ? 0 : depth_.rows - 1; y >= 0 && y < depth_.rows; y += step) {
+      const float* depth = depth_.ptr<float>(y);
+      for (int x = 0; x < depth_.cols; ++x) {
+        int& row = known[static_cast<std::size_t>(x)];
+        if (depth[x] > 0.0F) {
+          row = y;
+        } else if (row >= 0) {
+          propose({x, y}, {x, row}, std::abs(y - row));
+        }
       }
     }
   }
@@ -46,12 +61,15 @@ class DepthPropagation {
   }
 
  private:
-  void propose(const cv::Point& at, const cv::Point& known, float distance) {
+  // distance: pixels.
+  void propose(const cv::Point& at, const cv::Point& known, int distance) {
     const float cost =
-        difference(smooth_.at<cv::Vec3b>(at), smooth_.at<cv::Vec3b>(known)) + kDistanceCost * distance;
-    if (cost >= cost_.at<float>(at)) return;
-    cost_.at<float>(at) = cost;
-    filled_.at<float>(at) = depth_.at<float>(known);
+        difference(smooth_.ptr<cv::Vec3b>(at.y)[at.x], smooth_.ptr<cv::Vec3b>(known.y)[known.x]) +
+        kDistanceCost * static_cast<float>(distance);
+    float& least = cost_.ptr<float>(at.y)[at.x];
+    if (cost >= least) return;
+    least = cost;
+    filled_.ptr<float>(at.y)[at.x] = depth_.ptr<float>(known.y)[known.x];
   }
 
   const cv::Mat depth_;
@@ -66,13 +84,11 @@ cv::Mat filled_depth(const cv::Mat& depth, const cv::Mat& colour) {
   CV_Assert(depth.type() == CV_32FC1 && colour.type() == CV_8UC3 && colour.size() == depth.size());
   DepthPropagation propagation(depth, colour);
   for (int y = 0; y < depth.rows; ++y) {
-    propagation.sweep({0, y}, {1, 0});
-    propagation.sweep({depth.cols - 1, y}, {-1, 0});
+    propagation.sweep_row(y, 1);
+    propagation.sweep_row(y, -1);
   }
-  for (int x = 0; x < depth.cols; ++x) {
-    propagation.sweep({x, 0}, {0, 1});
-    propagation.sweep({x, depth.rows - 1}, {0, -1});
-  }
+  propagation.sweep_columns(1);
+  propagation.sweep_columns(-1);
   return propagation.result();
 }
 

@@ -9,6 +9,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/restoration/diffusion_inpainting.hpp"
+#include "roslam/restoration/disc_dilation.hpp"
 #include "roslam/restoration/seam_blending.hpp"
 
 namespace roslam {
@@ -35,8 +36,13 @@ struct Part {
 
 // The largest separate parts of the hole, at most max_crops.
 std::vector<Part> parts_of(const cv::Mat& hole, const InpaintingOptions& options) {
+  const int reach = options.min_width + options.joined_within + 1;
+  const cv::Rect box = cv::boundingRect(hole);
+  const cv::Rect around =
+      (box + cv::Size(2 * reach, 2 * reach) - cv::Point(reach, reach)) & cv::Rect({0, 0}, hole.size());
+  const cv::Mat near = hole(around);
   cv::Mat wide, joined, labels, stats, centroids;
-  cv::morphologyEx(hole, wide, cv::MORPH_OPEN, ellipse(options.min_width));
+  cv::morphologyEx(near, wide, cv::MORPH_OPEN, ellipse(options.min_width));
   cv::dilate(wide, joined, ellipse(options.joined_within + 1));
   std::vector<int> numbers(
       static_cast<std::size_t>(cv::connectedComponentsWithStats(joined, labels, stats, centroids)));
@@ -48,7 +54,8 @@ std::vector<Part> parts_of(const cv::Mat& hole, const InpaintingOptions& options
   numbers.resize(std::min(numbers.size(), static_cast<std::size_t>(options.max_crops)));
   std::vector<Part> parts;
   for (const int number : numbers) {
-    const cv::Mat part = (labels == number) & hole;
+    cv::Mat part = cv::Mat::zeros(hole.size(), CV_8UC1);
+    near.copyTo(part(around), labels == number);
     parts.push_back({cv::boundingRect(part), part});
   }
   return parts;
@@ -80,8 +87,7 @@ void inpaint_part(cv::Mat& image, const cv::Mat& hole, const Part& part, Movable
              cv::INTER_CUBIC);
 
   const cv::Mat in_crop = hole(crop);
-  cv::Mat rim;
-  cv::dilate(in_crop, rim, ellipse(2 * kSeamRim + 1));
+  const cv::Mat rim = dilated_by_disc(in_crop, 2 * kSeamRim + 1);
   matched_to_rim(image(crop), generated, rim, in_crop).copyTo(image(crop), part.hole(crop));
 }
 }  // namespace

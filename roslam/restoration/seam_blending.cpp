@@ -41,28 +41,78 @@ cv::Mat interpolated(const WeightedDifference& level) {
   const cv::Mat own = level.sum / three_channels(cv::max(level.weight, 1e-9));
   return from_coarse + (own - from_coarse).mul(share);
 }
+
+// Mean difference of the rim in blocks; no sum if no pixel of the rim can be used.
+WeightedDifference difference_along_rim(const cv::Mat& image, const cv::Mat& fill, const cv::Mat& known,
+                                        const cv::Mat& hole) {
+  const cv::Size blocks(std::max(1, image.cols / kBlock), std::max(1, image.rows / kBlock));
+  WeightedDifference blocked{cv::Mat::zeros(blocks, CV_32FC3), cv::Mat::zeros(blocks, CV_32FC1)};
+  bool is_any_used = false;
+  for (int y = 0; y < image.rows; ++y) {
+    const auto* is_known = known.ptr<std::uint8_t>(y);
+    const auto* is_hole = hole.ptr<std::uint8_t>(y);
+    const auto* taken = image.ptr<cv::Vec3b>(y);
+    const auto* filled = fill.ptr<cv::Vec3b>(y);
+    auto* sums = blocked.sum.ptr<cv::Vec3f>(y * blocks.height / image.rows);
+    auto* weights = blocked.weight.ptr<float>(y * blocks.height / image.rows);
+    for (int x = 0; x < image.cols; ++x) {
+      if (is_known[x] == 0 || is_hole[x] != 0) continue;
+      const cv::Vec3i difference = cv::Vec3i(taken[x]) - cv::Vec3i(filled[x]);
+      if (cv::norm(difference, cv::NORM_INF) > kLargestShift) continue;
+      const int block = x * blocks.width / image.cols;
+      sums[block] += cv::Vec3f(difference);
+      weights[block] += 1.0F;
+      is_any_used = true;
+    }
+  }
+  if (!is_any_used) return {};
+  const double pixels = static_cast<double>(image.total()) / static_cast<double>(blocks.area());
+  blocked.sum /= pixels;
+  blocked.weight /= pixels;
+  return blocked;
+}
+
+// Where an image of a size is sampled, between two neighbours, for a coordinate of an image of another size.
+struct Between {
+  int low, high;
+  float share;  // of high
+};
+
+std::vector<Between> positions(int size, int coarse_size) {
+  std::vector<Between> result;
+  const float scale = static_cast<float>(coarse_size) / static_cast<float>(size);
+  for (int i = 0; i < size; ++i) {
+    const float at =
+        std::clamp((static_cast<float>(i) + 0.5F) * scale - 0.5F, 0.0F, static_cast<float>(coarse_size - 1));
+    const int low = static_cast<int>(at);
+    result.push_back({low, std::min(low + 1, coarse_size - 1), at - static_cast<float>(low)});
+  }
+  return result;
+}
+
+cv::Vec3f between(const cv::Vec3f* row, const Between& at) {
+  return row[at.low] + at.share * (row[at.high] - row[at.low]);
+}
 }  // namespace
 
 cv::Mat matched_to_rim(const cv::Mat& image, const cv::Mat& fill, const cv::Mat& known, const cv::Mat& hole) {
-  cv::Mat difference;
-  cv::subtract(image, fill, difference, cv::noArray(), CV_32F);
-  std::vector<cv::Mat> channels;
-  cv::split(cv::abs(difference), channels);
-  const cv::Mat largest = cv::max(cv::max(channels[0], channels[1]), channels[2]);
-  const cv::Mat is_used = (known != 0) & (hole == 0) & (largest <= kLargestShift);
-  if (cv::countNonZero(is_used) == 0) return fill.clone();
-  difference.setTo(0, ~is_used);
-  cv::Mat weight;
-  is_used.convertTo(weight, CV_32F, 1.0 / 255.0);
-
-  const cv::Size blocks(std::max(1, image.cols / kBlock), std::max(1, image.rows / kBlock));
-  WeightedDifference coarse;
-  cv::resize(difference, coarse.sum, blocks, 0, 0, cv::INTER_AREA);
-  cv::resize(weight, coarse.weight, blocks, 0, 0, cv::INTER_AREA);
-  cv::Mat shift;
-  cv::resize(interpolated(coarse), shift, image.size(), 0, 0, cv::INTER_LINEAR);
-  cv::Mat result;
-  cv::add(fill, shift, result, cv::noArray(), CV_8U);
+  cv::Mat result = fill.clone();
+  const WeightedDifference difference = difference_along_rim(image, fill, known, hole);
+  if (difference.sum.empty()) return result;
+  const cv::Mat shift = interpolated(difference);
+  const auto columns = positions(image.cols, shift.cols), rows = positions(image.rows, shift.rows);
+  for (int y = 0; y < image.rows; ++y) {
+    const Between& row = rows[static_cast<std::size_t>(y)];
+    const auto *upper = shift.ptr<cv::Vec3f>(row.low), *lower = shift.ptr<cv::Vec3f>(row.high);
+    const auto* is_hole = hole.ptr<std::uint8_t>(y);
+    auto* colours = result.ptr<cv::Vec3b>(y);
+    for (int x = 0; x < image.cols; ++x) {
+      if (is_hole[x] == 0) continue;
+      const Between& column = columns[static_cast<std::size_t>(x)];
+      const cv::Vec3f above = between(upper, column), below = between(lower, column);
+      colours[x] = cv::Vec3f(colours[x]) + above + row.share * (below - above);
+    }
+  }
   return result;
 }
 

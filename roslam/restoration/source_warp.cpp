@@ -19,10 +19,6 @@ bool is_well_exposed(const cv::Vec3b& colour) {
   return *std::min_element(colour.val, colour.val + 3) >= kDarkest &&
          *std::max_element(colour.val, colour.val + 3) <= kBrightest;
 }
-
-void keep_nearest(float& kept, float depth) {
-  if (kept == 0.0F || depth < kept) kept = depth;
-}
 }  // namespace
 
 SourceWarp::SourceWarp(const PixelRays& rays, const SourceImage& source, const SE3& T_source_target,
@@ -43,10 +39,9 @@ std::optional<WarpedPoint> SourceWarp::project(const Eigen::Vector3f& point) con
   const Eigen::Vector3f in_source = source_from_target_ * point;
   const auto pixel = rays_->pixel(in_source);
   if (!pixel) return std::nullopt;
-  const cv::Point nearest(static_cast<int>(pixel->x() + 0.5F), static_cast<int>(pixel->y() + 0.5F));
-  return WarpedPoint{*pixel, in_source.z(), source_->depth.at<float>(nearest),
-                     source_->is_measured.at<std::uint8_t>(nearest) != 0,
-                     source_->is_static.at<std::uint8_t>(nearest) != 0};
+  WarpedPoint warped{*pixel, in_source.z()};
+  look_up(warped);
+  return warped;
 }
 
 float SourceWarp::weight(const Eigen::Vector3f& point, float depth_in_source) const {
@@ -63,40 +58,17 @@ cv::Vec3f SourceWarp::colour(const Eigen::Vector2f& pixel) const {
   const int y = std::min(static_cast<int>(pixel.y()), image.rows - 2);
   const float right = pixel.x() - static_cast<float>(x);
   const float low = pixel.y() - static_cast<float>(y);
+  const cv::Vec3b* above = image.ptr<cv::Vec3b>(y) + x;
+  const cv::Vec3b* below = image.ptr<cv::Vec3b>(y + 1) + x;
   cv::Vec3f result;
   for (int c = 0; c < 3; ++c) {
-    const auto at = [&](int dx, int dy) {
-      return static_cast<float>(image.at<cv::Vec3b>(y + dy, x + dx)[c]);
-    };
-    const float upper = at(0, 0) + right * (at(1, 0) - at(0, 0));
-    const float lower = at(0, 1) + right * (at(1, 1) - at(0, 1));
+    const auto upper_left = static_cast<float>(above[0][c]), upper_right = static_cast<float>(above[1][c]);
+    const auto lower_left = static_cast<float>(below[0][c]), lower_right = static_cast<float>(below[1][c]);
+    const float upper = upper_left + right * (upper_right - upper_left);
+    const float lower = lower_left + right * (lower_right - lower_left);
     result[c] = gain_[c] * (upper + low * (lower - upper));
   }
   return result;
-}
-
-void SourceWarp::splat(const cv::Rect& area, cv::Mat& measured, cv::Mat& completed) const {
-  measured = cv::Mat::zeros(area.size(), CV_32FC1);
-  completed = cv::Mat::zeros(area.size(), CV_32FC1);
-  const cv::Rect inside({0, 0}, area.size());
-  for (int y = 0; y < source_->depth.rows; ++y) {
-    const float* depths = source_->depth.ptr<float>(y);
-    const auto* is_measured = source_->is_measured.ptr<std::uint8_t>(y);
-    for (int x = 0; x < source_->depth.cols; ++x) {
-      if (depths[x] == 0.0F) continue;
-      const Eigen::Vector3f point = target_from_source_ * rays_->point(x, y, depths[x]);
-      const auto pixel = rays_->pixel(point);
-      if (!pixel) continue;
-      // A reading is splatted to the four pixels around it, so that a source a little farther away leaves no
-      // gaps.
-      const cv::Point corner(static_cast<int>(pixel->x()) - area.x, static_cast<int>(pixel->y()) - area.y);
-      if (corner.x < -1 || corner.y < -1 || corner.x >= area.width || corner.y >= area.height) continue;
-      cv::Mat& image = is_measured[x] != 0 ? measured : completed;
-      for (const cv::Point& at :
-           {corner, corner + cv::Point(1, 0), corner + cv::Point(0, 1), corner + cv::Point(1, 1)})
-        if (inside.contains(at)) keep_nearest(image.at<float>(at), point.z());
-    }
-  }
 }
 
 void SourceWarp::match_exposure(const PosedImage& target, const cv::Mat& free) {

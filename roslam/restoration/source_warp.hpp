@@ -31,6 +31,14 @@ class SourceWarp {
   /// Projects a point of the target camera frame into the source. Nothing outside the source image.
   std::optional<WarpedPoint> project(const Eigen::Vector3f& point) const;
 
+  /// Looks up what the source shows at the pixel of a point, which lies in the source image.
+  void look_up(WarpedPoint& point) const {
+    const int x = static_cast<int>(point.pixel.x() + 0.5F), y = static_cast<int>(point.pixel.y() + 0.5F);
+    point.source_depth = source_->depth.ptr<float>(y)[x];
+    point.is_measured = source_->is_measured.ptr<std::uint8_t>(y)[x] != 0;
+    point.is_static = source_->is_static.ptr<std::uint8_t>(y)[x] != 0;
+  }
+
   /// Depth difference up to which two readings are of one surface, metres.
   float tolerance(float depth) const { return (tolerance_ + growth_ * depth) * depth; }
 
@@ -51,15 +59,16 @@ class SourceWarp {
   /// Bilinearly interpolated colour (BGR) at a pixel of the source, times the exposure gain to the target.
   cv::Vec3f colour(const Eigen::Vector2f& pixel) const;
 
-  /// Forward-warps the source's static depth into an area of the target image (CV_32FC1 metres, 0 = none):
-  /// measured and filled-in depth separately.
-  void splat(const cv::Rect& area, cv::Mat& measured, cv::Mat& completed) const;
-
   /// Estimates the exposure gain of each channel, the median ratio over pixels that both images show. free:
   /// CV_8UC1, nonzero where the target shows the static scene. The gain stays 1 with too few such pixels.
   void match_exposure(const PosedImage& target, const cv::Mat& free);
 
   float age() const { return age_; }  ///< seconds between target and source
+  float age_weight() const { return age_weight_; }
+  float angle_scale() const { return angle_scale_; }         ///< radians
+  const Eigen::Vector3f& centre() const { return centre_; }  ///< of the source camera, in the target's frame
+  const SE3f& source_from_target() const { return source_from_target_; }
+  const SE3f& target_from_source() const { return target_from_source_; }
   const SourceImage& source() const { return *source_; }
 
  private:

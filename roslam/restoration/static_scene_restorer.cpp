@@ -7,6 +7,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/restoration/diffusion_inpainting.hpp"
+#include "roslam/restoration/disc_dilation.hpp"
 #include "roslam/restoration/seam_blending.hpp"
 
 namespace roslam {
@@ -111,10 +112,8 @@ RestoredImage StaticSceneRestorer::restore(const PosedImage& target,
 
   cv::Mat unfilled = hole.clone();
   if (settings_.restoration.reproject) {
-    cv::Mat area;
-    cv::dilate(hole, area,
-               cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * kSeamRim + 1, 2 * kSeamRim + 1}));
-    const ReprojectedArea reprojected = reprojection_.fill(target, area, sources);
+    const ReprojectedArea reprojected =
+        reprojection_.fill(target, dilated_by_disc(hole, 2 * kSeamRim + 1), sources);
     const cv::Mat filled =
         reprojected.filled & hole & (reprojected.certainty >= settings_.restoration.min_certainty);
     matched_to_rim(target.colour, reprojected.colour, reprojected.filled, hole).copyTo(result.colour, filled);
