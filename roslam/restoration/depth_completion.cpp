@@ -102,7 +102,7 @@ std::optional<Plane> fitted(const std::vector<Cell>& cells) {
 }
 
 bool lies_on(const Cell& cell, const Plane& plane, double tolerance) {
-  return std::abs(inverse_depth(plane, cell.x, cell.y) / cell.inverse - 1.0) <= tolerance;
+  return std::abs(inverse_depth(plane, cell.x, cell.y) - cell.inverse) <= tolerance * cell.inverse;
 }
 
 std::vector<Cell> cells_on(const std::vector<Cell>& cells, const Plane& plane, double tolerance) {
@@ -121,18 +121,21 @@ std::optional<Plane> largest_plane(const std::vector<Cell>& cells, int side, dou
   for (int trial = 0; trial < kTrials && cells.size() > most; ++trial) {
     const Cell& first = cells[static_cast<std::size_t>(random.uniform(0, static_cast<int>(cells.size())))];
     near.clear();
-    std::copy_if(cells.begin(), cells.end(), std::back_inserter(near), [&](const Cell& cell) {
-      return std::max(std::abs(cell.x - first.x), std::abs(cell.y - first.y)) <= kNeighbourhood * side;
-    });
+    const double reach = kNeighbourhood * side;
+    auto cell = std::partition_point(cells.begin(), cells.end(),  // they are in the order of their rows
+                                     [&](const Cell& other) { return other.y < first.y - reach; });
+    for (; cell != cells.end() && cell->y <= first.y + reach; ++cell)
+      if (std::abs(cell->x - first.x) <= reach) near.push_back(*cell);
     std::vector<Cell> three{first};
     for (int i = 0; i < 2; ++i)
       three.push_back(near[static_cast<std::size_t>(random.uniform(0, static_cast<int>(near.size())))]);
     const auto plane = fitted(three);
     if (!plane) continue;
-    const auto on = cells_on(cells, *plane, tolerance);
-    if (on.size() <= most) continue;
-    if (const auto better = fitted(on)) {
-      most = on.size();
+    const auto on = static_cast<std::size_t>(std::count_if(
+        cells.begin(), cells.end(), [&](const Cell& other) { return lies_on(other, *plane, tolerance); }));
+    if (on <= most) continue;
+    if (const auto better = fitted(cells_on(cells, *plane, tolerance))) {
+      most = on;
       best = better;
     }
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/restoration/source_image.hpp"
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 #include "roslam/restoration/depth_filling.hpp"
@@ -30,9 +31,25 @@ std::array<cv::Mat, kGreyLevels> grey_levels(const cv::Mat& colour) {
   return levels;
 }
 
+cv::Mat depth_range_of(const cv::Mat& depth) {
+  cv::Mat ranges = cv::Mat::zeros((depth.rows + kDepthBlock - 1) / kDepthBlock,
+                                  (depth.cols + kDepthBlock - 1) / kDepthBlock, CV_32FC2);
+  for (int y = 0; y < depth.rows; ++y) {
+    const float* row = depth.ptr<float>(y);
+    auto* of_row = ranges.ptr<cv::Vec2f>(y / kDepthBlock);
+    for (int x = 0; x < depth.cols; ++x) {
+      if (!(row[x] > 0.0F)) continue;
+      cv::Vec2f& range = of_row[x / kDepthBlock];
+      range[0] = range[0] > 0.0F ? std::min(range[0], row[x]) : row[x];
+      range[1] = std::max(range[1], row[x]);
+    }
+  }
+  return ranges;
+}
+
 std::optional<SourceImage> prepare_source(const PosedImage& image, const DepthOptions& options) {
   if (!image.T_world_camera || image.depth.empty()) return std::nullopt;
-  SourceImage source{image.timestamp, *image.T_world_camera, image.colour, {}, {}, {}, {}};
+  SourceImage source{image.timestamp, *image.T_world_camera, image.colour, {}, {}, {}, {}, {}};
   source.is_static = image.removed.empty() ? cv::Mat(image.colour.size(), CV_8UC1, cv::Scalar(255))
                                            : cv::Mat(image.removed == 0);
   source.is_measured = clear_of_edges(image.depth, options) & source.is_static;
@@ -42,6 +59,7 @@ std::optional<SourceImage> prepare_source(const PosedImage& image, const DepthOp
   source.depth = filled_depth(measured, image.colour);
   source.depth.setTo(0, ~source.is_static);
   source.grey = grey_levels(image.colour);
+  source.depth_range = depth_range_of(source.depth);
   return source;
 }
 

@@ -25,6 +25,12 @@ inline constexpr std::size_t kGreyLevels = 2;
 /// Grey image pyramid at a half and a quarter of the side (CV_8UC1).
 std::array<cv::Mat, kGreyLevels> grey_levels(const cv::Mat& colour);
 
+inline constexpr int kDepthBlock = 16;  ///< pixels, side of the blocks of SourceImage::depth_range
+
+/// Least and largest known depth (CV_32FC1, metres, 0 = unknown) in each block of kDepthBlock pixels:
+/// CV_32FC2, 0 where none is known.
+cv::Mat depth_range_of(const cv::Mat& depth);
+
 /// An image of the static scene that other images are filled from.
 struct SourceImage {
   double timestamp = 0.0;  ///< seconds
@@ -34,6 +40,7 @@ struct SourceImage {
   cv::Mat is_measured;  ///< CV_8UC1, nonzero where depth is measured, away from depth edges
   cv::Mat is_static;    ///< CV_8UC1, nonzero where nothing was removed
   std::array<cv::Mat, kGreyLevels> grey;  ///< of colour
+  cv::Mat depth_range;  ///< CV_32FC2, least and largest depth of each block of kDepthBlock pixels; 0 = none
 };
 
 /// Nonzero (CV_8UC1) where depth (CV_32FC1, metres) is within the limits and away from depth edges, where

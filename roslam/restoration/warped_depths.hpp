@@ -24,6 +24,10 @@ class WarpedDepths {
 
  private:
   void splat(const PixelRays& rays, const SourceWarp& warp, std::size_t source);
+  void splat_row(const PixelRays& rays, const SourceWarp& warp, std::size_t source, int y,
+                 const cv::Range& columns);
+  bool may_reach_area(const PixelRays& rays, const SourceWarp& warp, const cv::Rect& block,
+                      const cv::Vec2f& range) const;
 
   std::span<const float> at(const std::vector<float>& depths, int x, int y) const {
     return {depths.data() + static_cast<std::size_t>(numbers_.ptr<int>(y + 1)[x + 1]) * sources_, sources_};
@@ -31,7 +35,9 @@ class WarpedDepths {
 
   std::size_t sources_;
   cv::Mat numbers_;  // CV_32SC1 with a border of a pixel: the place of a pixel's depths; 0 outside the area
+  cv::Mat pixels_before_;  // CV_32SC1, integral image of the area
   std::vector<float> measured_, completed_;
+  std::vector<float> x_, y_, z_;  // scratch: the points of a row
 };
 
 }  // namespace roslam
