@@ -9,6 +9,7 @@
 
 #include "recording/removal_image.hpp"
 #include "roslam/common/error.hpp"
+#include "roslam/common/thread_priority.hpp"
 #include "roslam/common/write_file.hpp"
 #include "roslam/sensors/image_file.hpp"
 
@@ -52,7 +53,10 @@ RemovalLog::RemovalLog(const Settings& settings) : settings_(settings), strip_(k
   make_folder(settings.folder / kMaskFolder);
   lines_.open(settings.folder / kDescriptorFile, std::ios::binary);
   if (!lines_) throw OutputError((settings.folder / kDescriptorFile).string() + ": cannot open for writing");
-  thread_ = std::jthread([this] { work(); });
+  thread_ = std::jthread([this] {
+    if (settings_.mode == Mode::kRealTime) lower_thread_priority(ThreadPriority::kTenth);
+    work();
+  });
 }
 
 RemovalLog::~RemovalLog() {

@@ -24,6 +24,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("noise", "depth_sigma_growth", o.noise.depth_sigma_growth);
   visit("noise", "outlier_factor", o.noise.outlier_factor);
   visit("segmenter", "working_side", o.segmenter.working_side);
+  visit("segmenter", "threads", o.segmenter.threads);
   visit("dynamic_objects", "labels", o.dynamic_objects.labels);
   visit("dynamic_objects", "depth_consistency", o.dynamic_objects.depth_consistency);
   visit("dynamic_objects", "flow", o.dynamic_objects.flow);

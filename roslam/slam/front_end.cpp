@@ -75,8 +75,7 @@ DynamicObjects FrontEnd::detect(const Frame& frame, const cv::Mat& grey,
                                 const std::optional<SE3>& predicted_T_camera_world, std::size_t frame_count) {
   const auto is_taken = [&](LoadMeasure measure) { return load_ != nullptr && load_->is_taken(measure); };
   auto every = static_cast<std::size_t>(options_.dynamic_objects.label_every);
-  if (mode_ == Mode::kRealTime)
-    every = is_taken(LoadMeasure::kLabelsEveryThird) ? 3 : is_taken(LoadMeasure::kLabelsEverySecond) ? 2 : 1;
+  if (mode_ == Mode::kRealTime) every = is_taken(LoadMeasure::kLabelsEverySecond) ? 2 : 1;
   const bool examine_geometry = !is_taken(LoadMeasure::kGeometryEverySecond) || frame_count % 2 == 0;
   if (frame_count % every == 0) segmentation_.offer(frame.index, brightness_.apply(frame.colour));
   const auto labels = segmentation_.take();

@@ -19,8 +19,7 @@ enum class LoadMeasure {
   kRestorationWaits,     ///< keyframes wait to be restored; of too many the oldest keep their holes
   kDenseMapWaits,        ///< keyframes wait to be fused into the dense map
   kGeometryEverySecond,  ///< depth and flow are examined for motion in every second frame
-  kLabelsEverySecond,    ///< every second frame is offered to the network
-  kLabelsEveryThird
+  kLabelsEverySecond     ///< every second frame is offered to the network
 };
 
 /// Decides in real-time mode what gives way so that the tracking thread keeps up with the camera: one more
@@ -46,7 +45,7 @@ class LoadControl {
   std::map<std::string, std::size_t> frames() const;
 
  private:
-  static constexpr int kLevels = static_cast<int>(LoadMeasure::kLabelsEveryThird) + 1;
+  static constexpr int kLevels = static_cast<int>(LoadMeasure::kLabelsEverySecond) + 1;
 
   double budget_;         // seconds a frame; 0: unlimited
   double load_ = 0.0;     // moving average of the share of the budget that frames take

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from training.segmentation import checkpoint, cost, evaluation, losses, mixture, networks, train
 
-SIZE = evaluation.working_size(480, 640)  # what the network sees of a 640x480 camera by default
+SIZE = (320, 416)  # rows and columns of the input whose cost is compared
 
 
 def experiments():

@@ -8,7 +8,7 @@ from torch.nn import functional
 from training.segmentation import label_set
 from training.segmentation.networks import SIZE_MULTIPLE
 
-WORKING_SIDE = 416  # pixels, longer side of the picture the network sees
+WORKING_SIDE = 480  # pixels, longer side of the picture the network sees
 
 
 def working_size(height, width, side=WORKING_SIDE):

@@ -11,7 +11,6 @@ import torch
 from torch import nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from training.segmentation.evaluation import working_size
 from training.segmentation.networks import SIZE_MULTIPLE
 
 OPSET = 11  # the newest that OpenCV 4.6 reads in full
@@ -28,7 +27,7 @@ def folded(network):
     return network
 
 
-def export(network, file, size=working_size(480, 640)):
+def export(network, file, size=(320, 416)):
     """Writes the network and checks that OpenCV computes the same scores. size: height and width the file is traced
     with; with a pyramid of any-size windows it runs at every multiple of SIZE_MULTIPLE all the same. (Sizes left open in
     the file would be more honest, but OpenCV 4.6 cannot read those.)"""
