@@ -54,7 +54,7 @@ RemovalLog::RemovalLog(const Settings& settings) : settings_(settings), strip_(k
   lines_.open(settings.folder / kDescriptorFile, std::ios::binary);
   if (!lines_) throw OutputError((settings.folder / kDescriptorFile).string() + ": cannot open for writing");
   thread_ = std::jthread([this] {
-    if (settings_.mode == Mode::kRealTime) lower_thread_priority(ThreadPriority::kTenth);
+    if (settings_.mode == Mode::kRealTime) lower_thread_priority(ThreadPriority::kLowest);
     work();
   });
 }

@@ -18,7 +18,7 @@ void note(LoadControl& load, int frames, double share_of_budget) {
 
 TEST(LoadControl, TakesNoMeasureWhileThereIsTime) {
   LoadControl load(Mode::kRealTime, kFps);
-  note(load, 1000, 0.9);
+  note(load, 1000, 0.8);
   EXPECT_FALSE(load.is_taken(LoadMeasure::kRestorationWaits));
   EXPECT_TRUE(load.frames().empty());
   load.wait_while(LoadMeasure::kRestorationWaits);  // returns at once

@@ -8,10 +8,10 @@
 
 namespace roslam {
 
-/// How much of a core a thread gets where one of normal priority is busy.
+/// Niceness of threads that leave the core to those of normal priority, such as tracking.
 enum class ThreadPriority {
-  kThird = 3,  ///< about a third: labels, which are worth less the older they are
-  kTenth = 10  ///< about a tenth: what may be done later
+  kLow = 10,    ///< about a tenth of a contended core: labels, which are worth less the older they are
+  kLowest = 15  ///< a third of that: what may be done later
 };
 
 /// Lowers the priority of the calling thread for the rest of its life. Best effort: does nothing where the

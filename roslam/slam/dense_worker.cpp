@@ -116,7 +116,7 @@ void DenseWorker::Impl::queue(KeyframeId keyframe, Job job) {
 
 void DenseWorker::Impl::work(KeyframeId keyframe, const KeyframeWorker::ShouldStop& /*should_stop*/,
                              StageTimes& times) {
-  if (mode_ == Mode::kRealTime) lower_thread_priority(ThreadPriority::kTenth);
+  if (mode_ == Mode::kRealTime) lower_thread_priority(ThreadPriority::kLowest);
   if (load_ != nullptr) load_->wait_while(LoadMeasure::kDenseMapWaits);
   const auto job = jobs_.take(keyframe);
   if (!job) return;  // dropped

@@ -7,8 +7,8 @@ namespace roslam {
 
 namespace {
 constexpr double kSmoothing = 0.15;  // weight of the newest frame: an average over about 7 frames
-constexpr double kHigh = 0.95;       // of the time between two images
-constexpr double kLow = 0.75;
+constexpr double kHigh = 0.85;       // of the time between two images
+constexpr double kLow = 0.6;
 constexpr int kBeforeMore = 5;   // frames: the effect of the last measure must show first
 constexpr int kBeforeLess = 30;  // frames
 

@@ -36,7 +36,7 @@ void RestorationWorker::leave(KeyframeId keyframe) const {
 }
 
 void RestorationWorker::work(KeyframeId keyframe, StageTimes& times) {
-  if (mode_ == Mode::kRealTime) lower_thread_priority(ThreadPriority::kTenth);
+  if (mode_ == Mode::kRealTime) lower_thread_priority(ThreadPriority::kLowest);
   if (load_ != nullptr) load_->wait_while(LoadMeasure::kRestorationWaits);
   const auto job = jobs_.take(keyframe);
   if (!job) return;  // dropped

@@ -46,7 +46,7 @@ SegmentationWorker::SegmentationWorker(std::shared_ptr<Segmenter> segmenter, Mod
   // Detached, as nothing can end a thread that hangs in a network; all it touches is the state it shares.
   std::thread([state = state_, mode] {
     // An image more or less that is labelled matters less than a frame that is dropped.
-    if (mode == Mode::kRealTime) lower_thread_priority(ThreadPriority::kThird);
+    if (mode == Mode::kRealTime) lower_thread_priority(ThreadPriority::kLow);
     work(state);
   }).detach();
 }
