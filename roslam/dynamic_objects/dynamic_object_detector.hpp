@@ -45,6 +45,8 @@ class DynamicObjectDetector {
 
   /// grey: CV_8UC1, the frame's grey image. predicted_T_camera_world: by the motion model, if known. labels:
   /// new ones of this or an earlier frame, if any. Frames must come in order.
+  /// examine_geometry: false saves the time of depth and flow consistency; what earlier frames found is
+  /// carried to this one.
   DynamicObjects detect(const Frame& frame, const cv::Mat& grey,
                         const std::optional<SE3>& predicted_T_camera_world,
                         const std::optional<LabelledFrame>& labels, bool examine_geometry = true);
