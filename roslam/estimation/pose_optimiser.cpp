@@ -43,7 +43,7 @@ void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, boo
   jacobian.rightCols<3>() = -by_point * skew(point_camera);
   const double squared = error.squaredNorm();
   const double weight = robust && squared > limit ? std::sqrt(limit / squared) : 1.0;
-  system.hessian.noalias() += jacobian.transpose() * (weight * jacobian);
+  system.hessian.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose(), weight);
   system.gradient.noalias() += weight * jacobian.transpose() * error;
   system.cost += robust ? huber(squared, limit) : squared;
 }

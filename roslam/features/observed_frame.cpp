@@ -9,8 +9,8 @@
 namespace roslam {
 
 float depth_at(const cv::Mat& depth, const cv::Point2f& pixel, const DepthOptions& options) {
-  const int x = cvRound(pixel.x);
-  const int y = cvRound(pixel.y);
+  const auto x = static_cast<int>(std::lround(pixel.x));
+  const auto y = static_cast<int>(std::lround(pixel.y));
   if (x < 0 || y < 0 || x >= depth.cols || y >= depth.rows) return 0.0F;
   const auto least = static_cast<float>(options.min_depth);
   const auto most = static_cast<float>(options.max_depth);
