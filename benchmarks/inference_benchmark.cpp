@@ -12,6 +12,7 @@
 
 #include "benchmarks/benchmarks.hpp"
 #include "roslam/common/stopwatch.hpp"
+#include "roslam/common/upper_median.hpp"
 #include "roslam/inference/inference.hpp"
 #include "roslam/inference/network_runner.hpp"
 #include "roslam/inference/plan/onnx_graph.hpp"
@@ -21,12 +22,6 @@
 namespace roslam::benchmarks {
 
 namespace {
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
-}
-
 template <typename Work>
 double seconds_of(const Work& work) {
   const Stopwatch watch;
@@ -54,16 +49,6 @@ cv::Mat noise(int channels, int rows, int columns) {
   return blob;
 }
 
-void fill(const TensorView& input, const cv::Mat& blob, const NetworkRunner& runner) {
-  for (int c = 0; c < input.channels; ++c) {
-    const float* from = blob.ptr<float>(0, c);
-    for (int y = 0; y < input.rows; ++y) {
-      for (int x = 0; x < input.columns; ++x)
-        input.at(y, x)[c] = (*from++ - runner.mean(c)) / runner.deviation(c);
-    }
-  }
-}
-
 void by_turns(benchmark::State& state, const std::filesystem::path& file, const Kernels* kernels, int rows,
               int columns) {
   if (file.empty() || !has_opencv_dnn()) {
@@ -74,14 +59,14 @@ void by_turns(benchmark::State& state, const std::filesystem::path& file, const 
   own.prepare(rows, columns);
   const auto opencv = load_inference(file, InferenceBackend::kOpenCv);
   const cv::Mat blob = noise(own.input_channels(), rows, columns);
-  fill(own.input(), blob, own);
+  own.set_input(blob.ptr<float>());
   own.run();  // the first runs of both allocate memory
   opencv->run(blob);
   std::vector<double> own_seconds, opencv_seconds, ratios;
   double peak = 0.0;
   for (auto _ : state) {
     own_seconds.push_back(seconds_of([&] {
-      fill(own.input(), blob, own);
+      own.set_input(blob.ptr<float>());
       own.run();
     }));
     opencv_seconds.push_back(seconds_of([&] { opencv->run(blob); }));
@@ -91,9 +76,9 @@ void by_turns(benchmark::State& state, const std::filesystem::path& file, const 
     state.ResumeTiming();
   }
   const double least = *std::min_element(own_seconds.begin(), own_seconds.end());
-  state.counters["own_ms"] = 1e3 * median(own_seconds);
-  state.counters["opencv_ms"] = 1e3 * median(opencv_seconds);
-  state.counters["times_faster"] = median(ratios);
+  state.counters["own_ms"] = 1e3 * upper_median(own_seconds);
+  state.counters["opencv_ms"] = 1e3 * upper_median(opencv_seconds);
+  state.counters["times_faster"] = upper_median(ratios);
   state.counters["GFLOP/s"] = 2e-9 * own.multiply_adds() / least;
   state.counters["peak_GFLOP/s"] = 2e-9 * peak;
 }

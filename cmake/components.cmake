@@ -27,6 +27,15 @@ roslam_component(SEMANTICS nothing TRUE)
 roslam_component(DENSE liboctomap-dev octomap_FOUND)
 roslam_component(SIMULATION libembree-dev embree_FOUND)
 
+# Modules of OpenCV that are optional within the component semantics: ROSLAM_HAS_OPENCV_DNN and ROSLAM_HAS_OPENCV_PHOTO.
+foreach(module dnn photo)
+  string(TOUPPER ${module} name)
+  set(ROSLAM_HAS_OPENCV_${name} OFF)
+  if(ROSLAM_HAS_SEMANTICS AND ROSLAM_OPENCV_DNN AND TARGET opencv_${module})
+    set(ROSLAM_HAS_OPENCV_${name} ON)
+  endif()
+endforeach()
+
 foreach(name SEMANTICS DENSE)  # as C++ writes it
   if(ROSLAM_HAS_${name})
     set(ROSLAM_CONSTANT_${name} true)

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include "roslam/inference/network_runner.hpp"
 #include "roslam/inference/plan/onnx_graph.hpp"
@@ -17,6 +18,16 @@ namespace roslam {
 inline std::string file_content(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Those of this processor, the fastest first.
+inline std::vector<const Kernels*> runnable_kernels() {
+  std::vector<const Kernels*> all;
+  const Kernels* best = best_kernels();
+  if (best == nullptr) return all;
+  all.push_back(best);
+  if (best == avx512_kernels() && avx2_kernels() != nullptr) all.push_back(avx2_kernels());
+  return all;
 }
 
 /// Numbers from 0 to 1 in a fixed sequence; from channel 3 on (hole and square of the restorer) 0 or 1.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <opencv2/imgproc.hpp>
 
+#include "roslam/common/widened.hpp"
 #include "roslam/dynamic_objects/mask_refinement.hpp"
 
 namespace roslam {

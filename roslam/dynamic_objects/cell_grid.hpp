@@ -16,11 +16,6 @@ namespace roslam {
 /// entry is empty. Numbers that do not occur have empty boxes.
 std::vector<cv::Rect> boxes_of_numbers(const cv::Mat& numbers, int count);
 
-/// A rectangle that is larger by so many pixels (or cells) on each side.
-inline cv::Rect widened(const cv::Rect& box, int pixels) {
-  return {box.tl() - cv::Point(pixels, pixels), box.br() + cv::Point(pixels, pixels)};
-}
-
 /// Divides an image into square cells of a few pixels, so that every frame can be processed in full. Lens
 /// distortion is looked up in tables. Images of cells have size() and one value per cell.
 class CellGrid {

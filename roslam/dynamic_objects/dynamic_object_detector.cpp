@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "roslam/common/widened.hpp"
 #include "roslam/dynamic_objects/mask_growth.hpp"
 #include "roslam/dynamic_objects/mask_refinement.hpp"
 #include "roslam/dynamic_objects/object_evidence.hpp"

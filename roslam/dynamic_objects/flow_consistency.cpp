@@ -55,17 +55,22 @@ std::optional<SE3> FlowConsistency::track(const PastFrame& last, PastFrame& curr
 std::optional<SE3> FlowConsistency::camera_pose(const PastFrame& last, const PastFrame& current) const {
   if (!last.T_camera_world || !current.T_camera_world || last.depth.empty()) return std::nullopt;
   const SE3 T_world_last = last.T_camera_world->inverse();
-  std::vector<CornerMatch> usable;
+  struct Usable {
+    CornerMatch match;
+    float depth;  // in the last frame
+  };
+  std::vector<Usable> usable;
   for (const auto& match : common_corners(last, current)) {
-    if (!match.from->is_removed && depth_at(last.depth, match.from->pixel, depth_) > 0.0F)
-      usable.push_back(match);
+    if (match.from->is_removed) continue;
+    const float depth = depth_at(last.depth, match.from->pixel, depth_);
+    if (depth > 0.0F) usable.push_back({match, depth});
   }
   std::vector<PoseMeasurement> measurements;
   constexpr std::size_t kEnough = 200;
   const std::size_t count = std::min(usable.size(), kEnough);
   for (std::size_t i = 0; i < count; ++i) {
-    const auto& [from, to] = usable[i * usable.size() / count];
-    const float depth = depth_at(last.depth, from->pixel, depth_);
+    const auto& [match, depth] = usable[i * usable.size() / count];
+    const auto& [from, to] = match;
     const float now = current.depth.empty() ? 0.0F : depth_at(current.depth, to->pixel, depth_);
     PoseMeasurement m;
     m.point_world = T_world_last * camera_.unproject(from->undistorted, depth);

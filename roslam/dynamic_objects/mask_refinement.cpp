@@ -4,6 +4,8 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "roslam/common/widened.hpp"
+
 namespace roslam {
 
 namespace {

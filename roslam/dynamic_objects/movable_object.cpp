@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "roslam/common/upper_median.hpp"
+#include "roslam/common/widened.hpp"
 #include "roslam/dynamic_objects/cell_grid.hpp"
 
 namespace roslam {

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "roslam/common/error.hpp"
+#include "roslam/inference/image_planes.hpp"
 #include "roslam/inference/score_grid.hpp"
 
 namespace roslam {
@@ -27,21 +28,12 @@ std::string read_model(const std::filesystem::path& model) {
   if (bytes.empty()) throw ModelError(model.string() + ": is empty; install the model again");
   return bytes;
 }
-
-// 1 x 3 x height x width, RGB from 0 to 1.
-void fill_blob(const cv::Mat& image, cv::Mat& blob) {
-  const int size[] = {1, 3, image.rows, image.cols};
-  blob.create(4, size, CV_32F);
-  cv::Mat plane;
-  for (int c = 0; c < 3; ++c) {
-    cv::extractChannel(image, plane, 2 - c);
-    plane.convertTo(cv::Mat(image.size(), CV_32F, blob.ptr<float>(0, c)), CV_32F, 1.0 / 255.0);
-  }
-}
 }  // namespace
 
 ScoreGrid Inference::scores(const cv::Mat& image) {
-  fill_blob(image, blob_);
+  const int size[] = {1, 3, image.rows, image.cols};
+  blob_.create(4, size, CV_32F);
+  write_rgb_planes(image, blob_);
   return ScoreGrid::from_planes(run(blob_));
 }
 

@@ -21,7 +21,7 @@ struct ConvolutionRow {
   const std::ptrdiff_t* taps = nullptr;  ///< offset of each tap from that pixel
   int tap_count = 0;
   int channels = 0;                 ///< of the input
-  const float* weights = nullptr;   ///< packed: panel, tap, channel, output (packed_weights)
+  const float* weights = nullptr;   ///< packed: panel, tap, channel, output (NetworkRunner::pack)
   const float* bias = nullptr;      ///< padded to whole vectors
   const float* residual = nullptr;  ///< first output pixel's, or null
   std::ptrdiff_t residual_step = 0;

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <new>
 #include <string>
@@ -17,8 +15,8 @@ namespace roslam {
 namespace {
 constexpr std::align_val_t kCacheLine{64};
 constexpr int kLargestSide = 8192;
-constexpr std::size_t kMostFloats = std::size_t{1}
-                                    << 30U;  // of all buffers, as memory is only lent until it is used
+// Of all buffers, as memory is only lent until it is used.
+constexpr std::size_t kMostFloats = std::size_t{1} << 30U;
 
 [[noreturn]] void refuse_size(const PlannedStep& step) {
   throw ModelError("layer " + step.layer +
@@ -49,6 +47,17 @@ float NetworkRunner::mean(int channel) const {
 
 float NetworkRunner::deviation(int channel) const {
   return plan_.deviation.empty() ? 1.0F : plan_.deviation[static_cast<std::size_t>(channel)];
+}
+
+void NetworkRunner::set_input(const float* planes) {
+  const TensorView& in = views_[0];
+  for (int c = 0; c < in.channels; ++c) {
+    const float subtracted = mean(c);
+    const float divisor = deviation(c);
+    for (int y = 0; y < in.rows; ++y) {
+      for (int x = 0; x < in.columns; ++x) in.at(y, x)[c] = (*planes++ - subtracted) / divisor;
+    }
+  }
 }
 
 // Reorders weights from output, input, row, column to what the kernels read in sequence.

@@ -50,7 +50,10 @@ class NetworkRunner {
   /// if the network does not work at that size, std::bad_alloc.
   void prepare(int rows, int columns);
 
-  /// The input is written here before a run, unnormalised by normalise() or by the caller.
+  /// Takes the input of the next run: one plane for each channel, not normalised.
+  void set_input(const float* planes);
+
+  /// Where the input is written by who normalises it: (x - mean) / deviation.
   TensorView input() const { return views_[0]; }
   float mean(int channel) const;
   float deviation(int channel) const;

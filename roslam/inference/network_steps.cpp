@@ -1,11 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The steps of a network, row by row (NetworkRunner).
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "roslam/inference/network_runner.hpp"
 
 namespace roslam {
+
+namespace {
+// Offset of each tap of a square convolution from its first.
+std::array<std::ptrdiff_t, 9> taps_of(const PlannedStep& plan, const TensorView& in) {
+  std::array<std::ptrdiff_t, 9> taps{};
+  for (int t = 0; t < plan.kernel * plan.kernel; ++t)
+    taps[static_cast<std::size_t>(t)] =
+        (t / plan.kernel * in.row_step + t % plan.kernel * in.pixel_step) * plan.dilation;
+  return taps;
+}
+}  // namespace
 
 NetworkOutput NetworkRunner::run() {
   for (const PackedStep& step : steps_) run_step(step);
@@ -48,9 +60,9 @@ void NetworkRunner::convolve(const PackedStep& step, int begin, int end, float* 
   const PlannedStep& plan = step.plan;
   const TensorView& in = view(plan.input);
   const TensorView& out = view(plan.output);
-  std::ptrdiff_t taps[9] = {};
+  const auto taps = taps_of(plan, in);
   ConvolutionRow row;
-  row.taps = taps;
+  row.taps = taps.data();
   row.tap_count = plan.kernel * plan.kernel;
   row.channels = in.channels;
   row.weights = step.weights.data();
@@ -59,8 +71,6 @@ void NetworkRunner::convolve(const PackedStep& step, int begin, int end, float* 
   row.outputs = out.channels;
   row.pixels = out.columns;
   row.relu = plan.relu;
-  for (int t = 0; t < row.tap_count; ++t)
-    taps[t] = (t / plan.kernel * in.row_step + t % plan.kernel * in.pixel_step) * plan.dilation;
   DepthwiseRow depthwise;
   const std::ptrdiff_t whole = padded(in.channels);
   if (plan.depthwise) {
@@ -103,11 +113,10 @@ void NetworkRunner::convolve_single(const PackedStep& step, int begin, int end) 
   const PlannedStep& plan = step.plan;
   const TensorView& in = view(plan.input);
   const TensorView& out = view(plan.output);
-  std::ptrdiff_t taps[9];
-  for (int t = 0; t < 9; ++t) taps[t] = (t / 3 * in.row_step + t % 3 * in.pixel_step) * plan.dilation;
+  const auto taps = taps_of(plan, in);
   for (int y = begin; y < end; ++y) {
     kernels_.convolve_single({in.at(y * plan.stride - plan.padding, -plan.padding),
-                              plan.stride * in.pixel_step, taps, 9, in.channels, step.weights.data(),
+                              plan.stride * in.pixel_step, taps.data(), 9, in.channels, step.weights.data(),
                               plan.bias[0], out.at(y, 0), out.pixel_step, out.columns});
   }
 }
@@ -296,10 +305,9 @@ void NetworkRunner::normalise_regions(const PackedStep& step) {
 }
 
 void NetworkRunner::sigmoid(const PackedStep& step, int begin, int end) const {
-  const TensorView& in = view(step.plan.input);
+  copy(step, begin, end);
   const TensorView& out = view(step.plan.output);
   for (int y = begin; y < end; ++y) {
-    for (int x = 0; x < out.columns; ++x) std::copy_n(in.at(y, x), out.channels, out.at(y, x));
     if (out.pixel_step == out.channels) {
       kernels_.sigmoid(out.at(y, 0), static_cast<std::size_t>(out.columns * out.channels));
     } else {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
 #include <array>
 #include <new>
 
@@ -21,15 +20,7 @@ class OwnInference : public Inference {
     if (input.dims != 4 || input.type() != CV_32F || input.size[0] != 1)
       throw ModelError(model_.string() + ": the network cannot be run (its input has another shape)");
     prepare(input.size[1], input.size[2], input.size[3]);
-    const TensorView view = runner_.input();
-    for (int c = 0; c < view.channels; ++c) {
-      const float mean = runner_.mean(c);
-      const float deviation = runner_.deviation(c);
-      const float* from = input.ptr<float>(0, c);
-      for (int y = 0; y < view.rows; ++y) {
-        for (int x = 0; x < view.columns; ++x) view.at(y, x)[c] = (*from++ - mean) / deviation;
-      }
-    }
+    runner_.set_input(input.ptr<float>());
     return planes_of(runner_.run());
   }
 

@@ -4,6 +4,8 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/photo.hpp>
 
+#include "roslam/common/widened.hpp"
+
 namespace roslam {
 
 bool has_diffusion_inpainting() { return true; }
@@ -11,10 +13,7 @@ bool has_diffusion_inpainting() { return true; }
 void inpaint_by_diffusion(cv::Mat& image, const cv::Mat& hole, ClassicMethod method) {
   constexpr double kRadius = 5;  // pixels around each pixel that are considered
   constexpr int kRim = 2 * static_cast<int>(kRadius);
-  const cv::Rect bounds = cv::boundingRect(hole);
-  const cv::Rect box =
-      cv::Rect(bounds.x - kRim, bounds.y - kRim, bounds.width + 2 * kRim, bounds.height + 2 * kRim) &
-      cv::Rect({0, 0}, image.size());
+  const cv::Rect box = widened(cv::boundingRect(hole), kRim) & cv::Rect({0, 0}, image.size());
   cv::Mat filled;
   cv::inpaint(image(box), hole(box), filled, kRadius,
               method == ClassicMethod::kTelea ? cv::INPAINT_TELEA : cv::INPAINT_NS);

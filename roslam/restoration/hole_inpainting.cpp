@@ -8,6 +8,7 @@
 #include <string>
 
 #include "roslam/common/error.hpp"
+#include "roslam/common/widened.hpp"
 #include "roslam/restoration/diffusion_inpainting.hpp"
 #include "roslam/restoration/disc_dilation.hpp"
 #include "roslam/restoration/seam_blending.hpp"
@@ -38,8 +39,7 @@ struct Part {
 std::vector<Part> parts_of(const cv::Mat& hole, const InpaintingOptions& options) {
   const int reach = options.min_width + options.joined_within + 1;
   const cv::Rect box = cv::boundingRect(hole);
-  const cv::Rect around =
-      (box + cv::Size(2 * reach, 2 * reach) - cv::Point(reach, reach)) & cv::Rect({0, 0}, hole.size());
+  const cv::Rect around = widened(box, reach) & cv::Rect({0, 0}, hole.size());
   const cv::Mat near = hole(around);
   cv::Mat wide, joined, labels, stats, centroids;
   cv::morphologyEx(near, wide, cv::MORPH_OPEN, ellipse(options.min_width));

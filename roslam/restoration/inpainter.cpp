@@ -5,6 +5,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/resources.hpp"
+#include "roslam/inference/image_planes.hpp"
 
 namespace roslam {
 
@@ -21,11 +22,7 @@ cv::Mat channel(cv::Mat& blob, int number) {
 cv::Mat network_input(const cv::Mat& crop, const cv::Mat& hole, const cv::Rect& square) {
   const std::array sizes{1, 5, kCropSide, kCropSide};
   cv::Mat blob(static_cast<int>(sizes.size()), sizes.data(), CV_32FC1, cv::Scalar(0));
-  for (int c = 0; c < 3; ++c) {
-    cv::Mat plane;
-    cv::extractChannel(crop, plane, 2 - c);
-    plane.convertTo(channel(blob, c), CV_32F, 1.0 / 255.0);
-  }
+  write_rgb_planes(crop, blob);
   channel(blob, 3).setTo(1.0, hole);
   channel(blob, 4)(square & cv::Rect(0, 0, kCropSide, kCropSide)).setTo(1.0);
   return blob;

@@ -74,14 +74,9 @@ int Lowering::add_tensor(int channels) {
   return static_cast<int>(plan_.tensors.size()) - 1;
 }
 
-const OnnxArray* Lowering::array(const std::string& name) const {
-  const auto found = graph_.arrays.find(name);
-  return found == graph_.arrays.end() ? nullptr : &found->second;
-}
-
 std::vector<float> Lowering::numbers(const OnnxNode& node, std::size_t input) const {
   if (node.inputs.size() <= input || node.inputs[input].empty()) return {};
-  const OnnxArray* found = array(node.inputs[input]);
+  const OnnxArray* found = graph_.array(node.inputs[input]);
   if (found == nullptr) refuse_layer(node, "has an input that is not a constant");
   return found->values;
 }

@@ -44,7 +44,6 @@ class Lowering {
   int input_channels() const;
   int add_tensor(int channels);
   PlannedTensor& tensor(int index) { return plan_.tensors[static_cast<std::size_t>(index)]; }
-  const OnnxArray* array(const std::string& name) const;
   // The numbers of a constant input; nothing if it is left out.
   std::vector<float> numbers(const OnnxNode& node, std::size_t input) const;
   LoweredValue& value(const OnnxNode& node, std::size_t input);

@@ -9,7 +9,7 @@
 namespace roslam {
 
 Lowering::Shape Lowering::shape_of(const OnnxNode& node) const {
-  const OnnxArray* weights = node.inputs.size() < 2 ? nullptr : array(node.inputs[1]);
+  const OnnxArray* weights = node.inputs.size() < 2 ? nullptr : graph_.array(node.inputs[1]);
   if (weights == nullptr || weights->shape.size() != 4 || weights->values.empty())
     refuse_layer(node, "has no constant weights of four dimensions");
   const auto& dims = weights->shape;
@@ -27,10 +27,10 @@ Lowering::Shape Lowering::shape_of(const OnnxNode& node) const {
   shape.dilation = same("dilations", 1, 2);
   shape.padding = same("pads", 0, 4);
   shape.groups = static_cast<int>(std::clamp<std::int64_t>(node.attribute("group", {1})[0], 0, kMaxChannels));
-  const std::string padding = node.texts.count("auto_pad") == 0 ? "NOTSET" : node.texts.at("auto_pad");
   const bool is_known = dims[2] == dims[3] && (shape.kernel == 1 || shape.kernel == 3) &&
-                        padding == "NOTSET" && (shape.stride == 1 || shape.stride == 2) &&
-                        shape.dilation >= 1 && shape.padding == shape.dilation * (shape.kernel / 2);
+                        node.text("auto_pad", "NOTSET") == "NOTSET" &&
+                        (shape.stride == 1 || shape.stride == 2) && shape.dilation >= 1 &&
+                        shape.padding == shape.dilation * (shape.kernel / 2);
   if (!is_known) refuse_layer(node, "is not a square convolution of 1 or 3 pixels that keeps the size");
   return shape;
 }
@@ -55,7 +55,7 @@ void Lowering::lower_convolution(const OnnxNode& node) {
   step.stride = shape.stride;
   step.padding = shape.padding;
   step.dilation = shape.dilation;
-  step.weights = array(node.inputs[1])->values;
+  step.weights = graph_.array(node.inputs[1])->values;
   step.bias = bias_of(node, shape.outputs);
   const bool is_single_pixel = in.is_single_pixel;
   if (in.depthwise && shape.kernel == 1 && shape.stride == 1 && is_used_once(node.inputs[0])) {
@@ -76,12 +76,12 @@ void Lowering::lower_depthwise(const OnnxNode& node, const Shape& shape) {
   made.tensor = tensor_of(node, 0);
   need_border(made.tensor, 1);
   made.depthwise =
-      DepthwiseWeights{shape.stride, array(node.inputs[1])->values, bias_of(node, shape.outputs)};
+      DepthwiseWeights{shape.stride, graph_.array(node.inputs[1])->values, bias_of(node, shape.outputs)};
   set(node, std::move(made));
 }
 
 void Lowering::lower_transposed(const OnnxNode& node) {
-  const OnnxArray* weights = node.inputs.size() < 2 ? nullptr : array(node.inputs[1]);
+  const OnnxArray* weights = node.inputs.size() < 2 ? nullptr : graph_.array(node.inputs[1]);
   const bool is_known = weights != nullptr && weights->shape.size() == 4 && !weights->values.empty() &&
                         weights->shape[2] == 2 && weights->shape[3] == 2 &&
                         weights->shape[1] <= kMaxChannels / 4 &&

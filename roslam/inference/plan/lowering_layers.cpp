@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "roslam/common/error.hpp"
-
 namespace roslam {
 
 void Lowering::lower_region_norm(const OnnxNode& node, const RegionNormMatch& norm) {
@@ -54,7 +52,8 @@ bool Lowering::takes_residual(const OnnxNode& node, std::size_t input) {
 
 void Lowering::lower_add(const OnnxNode& node) {
   if (node.inputs.size() != 2) refuse_layer(node, "does not have two inputs");
-  if (array(node.inputs[0]) != nullptr || array(node.inputs[1]) != nullptr) return lower_binary(node);
+  if (graph_.array(node.inputs[0]) != nullptr || graph_.array(node.inputs[1]) != nullptr)
+    return lower_binary(node);
   for (const std::size_t input : {1U, 0U}) {
     if (node.inputs[0] == node.inputs[1] || !takes_residual(node, input)) continue;
     const LoweredValue& other = value(node, 1 - input);
@@ -70,8 +69,8 @@ void Lowering::lower_add(const OnnxNode& node) {
 
 void Lowering::lower_binary(const OnnxNode& node) {
   if (node.inputs.size() != 2) refuse_layer(node, "does not have two inputs");
-  const OnnxArray* first = array(node.inputs[0]);
-  const OnnxArray* second = array(node.inputs[1]);
+  const OnnxArray* first = graph_.array(node.inputs[0]);
+  const OnnxArray* second = graph_.array(node.inputs[1]);
   if (first != nullptr && second != nullptr) refuse_layer(node, "computes a constant");
   if (second != nullptr && value(node, 0).is_image && normalise_image(node, second->values)) return;
   PlannedStep step;
@@ -134,10 +133,9 @@ void Lowering::lower_sigmoid(const OnnxNode& node) {
 void Lowering::lower_pad(const OnnxNode& node) {
   std::vector<float> pads = numbers(node, 1);
   const std::vector<float> fill = numbers(node, 2);
-  const std::string mode = node.texts.count("mode") == 0 ? "constant" : node.texts.at("mode");
   const bool is_known = pads.size() == 8 && pads[0] == 0.0F && pads[1] == 0.0F && pads[4] == 0.0F &&
                         pads[5] == 0.0F && pads[3] == pads[2] && pads[6] == pads[2] && pads[7] == pads[2] &&
-                        pads[2] >= 0.0F && pads[2] <= 64.0F && mode == "constant" &&
+                        pads[2] >= 0.0F && pads[2] <= 64.0F && node.text("mode", "constant") == "constant" &&
                         (fill.empty() || fill[0] == 0.0F);
   if (!is_known) refuse_layer(node, "is not an equal padding with zeros on all sides");
   const int same = tensor_of(node, 0);
@@ -177,13 +175,9 @@ void Lowering::lower_global_pool(const OnnxNode& node) {
 }
 
 void Lowering::lower_resize(const OnnxNode& node) {
-  const auto text = [&](const char* name, const char* otherwise) {
-    const auto found = node.texts.find(name);
-    return found == node.texts.end() ? std::string(otherwise) : found->second;
-  };
   const bool is_known = numbers(node, 2) == std::vector<float>{1.0F, 1.0F, 2.0F, 2.0F} &&
-                        node.inputs.size() == 3 && text("mode", "nearest") == "linear" &&
-                        text("coordinate_transformation_mode", "half_pixel") == "half_pixel";
+                        node.inputs.size() == 3 && node.text("mode", "nearest") == "linear" &&
+                        node.text("coordinate_transformation_mode", "half_pixel") == "half_pixel";
   if (!is_known) refuse_layer(node, "does not double the size bilinearly");
   LoweredValue made;
   made.channels = value(node, 0).channels;
@@ -244,8 +238,7 @@ void Lowering::lower_slice(const OnnxNode& node) {
 
 void Lowering::lower_depth_to_space(const OnnxNode& node) {
   const int channels = value(node, 0).channels;
-  const std::string mode = node.texts.count("mode") == 0 ? "DCR" : node.texts.at("mode");
-  if (node.attribute("blocksize", {0})[0] != 2 || mode != "CRD" || channels % 4 != 0)
+  if (node.attribute("blocksize", {0})[0] != 2 || node.text("mode", "DCR") != "CRD" || channels % 4 != 0)
     refuse_layer(node, "is not a rearrangement of four channels to 2x2 pixels in the order CRD");
   PlannedStep step;
   step.kind = StepKind::kDepthToSpace;

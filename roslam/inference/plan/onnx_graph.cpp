@@ -2,7 +2,6 @@
 #include "roslam/inference/plan/onnx_graph.hpp"
 
 #include <cstring>
-#include <set>
 #include <utility>
 
 #include "roslam/common/error.hpp"
@@ -150,6 +149,16 @@ std::vector<std::int64_t> OnnxNode::attribute(const std::string& attribute_name,
                                               std::vector<std::int64_t> otherwise) const {
   const auto found = integers.find(attribute_name);
   return found == integers.end() ? std::move(otherwise) : found->second;
+}
+
+std::string OnnxNode::text(const std::string& attribute_name, const std::string& otherwise) const {
+  const auto found = texts.find(attribute_name);
+  return found == texts.end() ? otherwise : found->second;
+}
+
+const OnnxArray* OnnxGraph::array(const std::string& value) const {
+  const auto found = arrays.find(value);
+  return found == arrays.end() ? nullptr : &found->second;
 }
 
 OnnxGraph read_onnx(const std::string& bytes) {

@@ -29,6 +29,9 @@ struct OnnxNode {
   /// Type and name, for messages.
   std::string title() const { return type + (name.empty() ? std::string() : " " + name); }
 
+  /// The attribute that is a string, or the one given where the node has none.
+  std::string text(const std::string& attribute_name, const std::string& otherwise) const;
+
   /// The attribute, or the values given where the node has none.
   std::vector<std::int64_t> attribute(const std::string& attribute_name,
                                       std::vector<std::int64_t> otherwise) const;
@@ -41,6 +44,9 @@ struct OnnxGraph {
   std::string input;
   std::string output;
   std::int64_t input_channels = 0;  ///< 0 if the file does not say
+
+  /// The constant of that name; null if the value is none.
+  const OnnxArray* array(const std::string& value) const;
 };
 
 /// Reads an ONNX file (Protocol Buffers; onnx.ai, file format IR version 3 and later). Throws ModelError,

@@ -68,9 +68,10 @@ class Matcher {
     return node->inputs[0];
   }
 
+  // Null also for a constant of a type whose numbers are not read.
   const OnnxArray* array(const std::string& value) const {
-    const auto found = graph_.arrays.find(value);
-    return found == graph_.arrays.end() || found->second.values.empty() ? nullptr : &found->second;
+    const OnnxArray* found = graph_.array(value);
+    return found == nullptr || found->values.empty() ? nullptr : found;
   }
 
   // The other operand of a commutative node one of whose operands is an array.
