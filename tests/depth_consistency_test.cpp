@@ -194,6 +194,25 @@ TEST_F(FreeSpace, WhatMovesIsFoundCellByCell) {
   }
 }
 
+// What a thing has just covered is narrow, and has the depth of the rest of the thing, which is where it was.
+TEST_F(FreeSpace, TheLeadingEdgeOfAThingMoves) {
+  for (int i = 0; i < 12; ++i) {
+    const double x = -0.3 + 0.005 * i;  // metres; a cell has 0.015 there
+    history_.clear();
+    const std::vector<Panel> before{kWall, {x, -0.4, x + 0.6, 0.4, 2.0}};
+    watch(before);
+    cv::Mat seen = grid_.mask_cells(stage_.show(before).shows(2));
+    cv::dilate(seen, seen, cv::Mat());  // nothing saw through what lies beside its old place
+    for (const double step : {0.05, 0.07, 0.1}) {
+      const std::vector<Panel> after{kWall, before[1].shifted(step)};
+      const cv::Mat covered = grid_.mask_cells(stage_.show(after).shows(2)) & ~seen;
+      ASSERT_GT(cv::countNonZero(covered), 50) << x << ' ' << step;
+      // Half of two columns may be at an edge, where depth is unknown.
+      EXPECT_GT(share_of(examine(after), MotionEvidence::kMoving, covered), 0.45) << x << ' ' << step;
+    }
+  }
+}
+
 TEST(Cells, BoxesOfNumbersEncloseThem) {
   cv::Mat numbers = cv::Mat::zeros(30, 40, CV_32SC1);
   numbers(cv::Rect(3, 4, 5, 6)).setTo(1);

@@ -88,6 +88,29 @@ TEST_F(Flow, PointsThatWereRemovedAreFollowedToo) {
   EXPECT_GT(count_on(followed.at_rest, second.shows(2)), 10U);
 }
 
+TEST_F(Flow, WhatAThingCoversIsNotAtRest) {
+  for (const double x : {-0.2, 0.0, 0.2}) {
+    const View view = stage_.show({kWall, kPatch.shifted(x, 0.0)}, moved_);
+    const auto followed = follow(frame({kWall}, 0.0, {}), stage_.past(view, 4, 0.13, moved_));
+    EXPECT_EQ(count_on(followed.at_rest, inside(view.shows(2), 2)), 0U) << x;
+    EXPECT_GT(count_on(followed.at_rest, far_from(view.shows(2))), 100U) << x;
+  }
+}
+
+TEST_F(Flow, TheReturnErrorIsHowFarATrackIsOff) {
+  std::vector<CornerMatch> matches;
+  const PastFrame before = frame({kWall}, 0.0, {});
+  ASSERT_GT(before.corners.size(), 20U);
+  std::vector<Corner> off = before.corners;  // tracked to the same place, but for an error of 2 pixels
+  for (Corner& corner : off) corner.pixel.x += 2.0F;
+  for (std::size_t i = 0; i < off.size(); ++i) matches.push_back({&before.corners[i], &off[i]});
+  std::size_t measured = 0;
+  for (const float error : return_errors(before.pyramid, before.pyramid, matches)) {
+    measured += std::abs(error - 2.0F) < 0.3F ? 1 : 0;
+  }
+  EXPECT_GT(10 * measured, 8 * matches.size());
+}
+
 TEST_F(Flow, WithoutDepthAPointMayLieAnywhereOnItsEpipolarLine) {
   const SE3 sideways = looking_from(0.1, 0.0, 0.0);
   const auto moving_on_patch = [&](double x, double y) {

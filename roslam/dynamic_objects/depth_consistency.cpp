@@ -50,6 +50,27 @@ cv::Mat with_support(const cv::Mat& votes, int needed, int cells) {
   }
   return result;
 }
+
+bool is_same_surface(float a, float b, float tolerance) { return std::abs(a - b) <= tolerance * b; }
+
+// Marks the blocks with a cell whose depth differs from that of the known cell before it in the row or
+// column.
+void mark_depth_edges(const cv::Mat& depth, float tolerance, int block, cv::Mat& marked) {
+  std::vector<float> above(static_cast<std::size_t>(depth.cols), 0.0F);
+  for (int y = 0; y < depth.rows; ++y) {
+    const auto* row = depth.ptr<float>(y);
+    float left = 0.0F;
+    for (int x = 0; x < depth.cols; ++x) {
+      const float z = row[x];
+      if (z <= 0.0F) continue;
+      float& up = above[static_cast<std::size_t>(x)];
+      if ((left > 0.0F && !is_same_surface(z, left, tolerance)) ||
+          (up > 0.0F && !is_same_surface(z, up, tolerance)))
+        marked.at<std::uint8_t>(y / block, x / block) = 1;
+      left = up = z;
+    }
+  }
+}
 }  // namespace
 
 // Known cells of the current frame with their points, packed so that many are transformed at once.
@@ -123,8 +144,8 @@ void DepthConsistency::vote(const CellGrid& grid, const PackedCells& cells, cons
 }
 
 // Votes on one cell of each block first. Where its surface and those of the neighbouring blocks were seen and
-// never seen through, its votes hold for the other cells of the block that lie on the same surface; elsewhere
-// each cell is voted on.
+// never seen through, its votes hold for the other cells of the block that lie on the same surface. Elsewhere
+// each cell is voted on, as it is near depth edges: there a moving object covers what was seen through.
 DepthConsistency::Votes DepthConsistency::votes_on(const CellGrid& grid, const cv::Mat& depth,
                                                    const SE3& T_camera_world, double timestamp) const {
   constexpr int kBlock = 4;  // cells
@@ -155,13 +176,14 @@ DepthConsistency::Votes DepthConsistency::votes_on(const CellGrid& grid, const c
     const int cell = first.ptr<int>()[i];
     is_suspect.data[i] = cell >= 0 && (votes.through.data[cell] != 0 || votes.same.data[cell] == 0);
   }
+  const auto same_surface = static_cast<float>(options_.depth_tolerance);
+  mark_depth_edges(depth, same_surface, kBlock, is_suspect);
   cv::dilate(is_suspect, is_suspect, cv::Mat());
   cells = {};
-  const auto same_surface = static_cast<float>(options_.depth_tolerance);
   for_each_known([&](int cell, const cv::Point& block) {
     const int known = first.at<int>(block);
-    const bool holds = is_suspect.at<std::uint8_t>(block) == 0 &&
-                       std::abs(z_of[cell] - z_of[known]) <= same_surface * z_of[known];
+    const bool holds =
+        is_suspect.at<std::uint8_t>(block) == 0 && is_same_surface(z_of[cell], z_of[known], same_surface);
     if (holds)
       votes.copy(known, cell);
     else if (cell != known)

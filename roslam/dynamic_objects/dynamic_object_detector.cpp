@@ -256,13 +256,15 @@ DynamicObjects DynamicObjectDetector::compose_masks(const CellScene& scene) {
   std::vector<MovableObject> kept;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     MovableObject& object = objects[i];
-    if (boxes[i + 1].empty()) {
-      // Not in this mask, but it may be in the next.
+    cv::Mat object_mask;
+    if (!boxes[i + 1].empty()) object_mask = owners(boxes[i + 1]) == static_cast<int>(i) + 1;
+    if (cv::countNonZero(object_mask) < grid_.side() * grid_.side()) {
+      // Less than a cell is left of it by the refinement: not in this mask, but it may be in the next.
       if (!object.is_confirmed || object.kind == Movable::kUnknown) kept.push_back(object);
       continue;
     }
     object.box = boxes[i + 1] + area.tl();
-    object.mask = owners(boxes[i + 1]) == static_cast<int>(i) + 1;
+    object.mask = object_mask;
     object.median_depth = median_depth(object, depth_cells_, grid_);
     draw_object(object, mask);
     if (object.is_at_rest) {

@@ -14,6 +14,9 @@ constexpr int kMinPosePoints = 20;
 constexpr double kMinAgreement = 0.5;  // of the points tracked
 constexpr double kFar = 1e4;           // metres, for unknown depth: only rotation matters
 
+// Limit of the forward-backward error, the larger of the two.
+constexpr float kMaxReturn = 1.0F;       // pixels
+constexpr float kMaxReturnShare = 0.1F;  // of the motion against the static scene
 }  // namespace
 
 cv::Point2f FlowConsistency::expected(const PastFrame& past, const PastFrame& current,
@@ -111,6 +114,16 @@ double FlowConsistency::residual(const Eigen::Vector2d& from, float depth, const
   return (to - begin - share * along).squaredNorm() / (pixel_sigma * pixel_sigma);
 }
 
+// Whether a nearer surface is now where the corner would be if static, so that its track is wrong.
+bool FlowConsistency::is_covered(const Corner& from, float depth, const Corner& to,
+                                 const cv::Mat& depth_image, const SE3& T_current_past) const {
+  if (depth <= 0.0F || depth_image.empty()) return false;
+  const double now = depth_at(depth_image, to.pixel, depth_);
+  const double z = (T_current_past * camera_.unproject(from.undistorted, depth)).z();
+  const double sigma = std::hypot(noise_.sigma_of_depth(depth), noise_.sigma_of_depth(now));
+  return now > 0.0 && now < z - 3.0 * sigma - options_.depth_tolerance * z;
+}
+
 TrackedPoints FlowConsistency::follow(const PastFrame& past, PastFrame& current) const {
   if (!past.T_camera_world || !current.T_camera_world) return {};
   const auto matches = common_corners(past, current);
@@ -130,24 +143,29 @@ TrackedPoints FlowConsistency::follow(const PastFrame& past, PastFrame& current)
   result.sigma = std::max(1.0, std::sqrt(upper_median(errors)) / kSigmaOfMedian);
   const double limit = options_.flow_tolerance * options_.flow_tolerance;
   std::vector<CornerMatch> moving;
+  std::vector<int> lost;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     const auto& [from, to] = matches[i];
     if (residual(from->undistorted, depths[i], to->undistorted, T_current_past, result.sigma) > limit) {
       moving.push_back(matches[i]);
+    } else if (is_covered(*from, depths[i], *to, current.depth, T_current_past)) {
+      lost.push_back(to->track);
     } else {
       result.at_rest.push_back(to->pixel);
     }
   }
   // Only corners that were tracked correctly move with the static scene, so that the others alone are
-  // checked.
-  const auto is_confirmed = are_tracked_back(past.pyramid, current.pyramid, moving);
-  std::vector<int> lost;
+  // checked. The longer the motion, the less it matters how precisely it was tracked.
+  const auto errors_back = return_errors(past.pyramid, current.pyramid, moving);
   for (std::size_t i = 0; i < moving.size(); ++i) {
-    if (is_confirmed[i])
+    const auto& [from, to] = moving[i];
+    const cv::Point2f motion = to->pixel - expected(past, current, from->pixel, from->undistorted);
+    if (errors_back[i] <= std::max(kMaxReturn, kMaxReturnShare * std::hypot(motion.x, motion.y)))
       result.moving.push_back(moving[i].to->pixel);
     else
       lost.push_back(moving[i].to->track);
   }
+  std::sort(lost.begin(), lost.end());
   std::erase_if(current.corners, [&](const Corner& corner) {
     return std::binary_search(lost.begin(), lost.end(), corner.track);
   });

@@ -52,6 +52,8 @@ class FlowConsistency {
   std::optional<SE3> camera_pose(const PastFrame& last, const PastFrame& current) const;
   double residual(const Eigen::Vector2d& from, float depth, const Eigen::Vector2d& to,
                   const SE3& T_current_past, double pixel_sigma) const;
+  bool is_covered(const Corner& from, float depth, const Corner& to, const cv::Mat& depth_image,
+                  const SE3& T_current_past) const;
 
   Camera camera_;
   DynamicObjectOptions options_;

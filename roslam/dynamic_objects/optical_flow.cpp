@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <iterator>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <utility>
@@ -12,9 +13,8 @@
 namespace roslam {
 
 namespace {
-constexpr int kHalved = 480;        // columns of images from which on flow is computed at half the resolution
-constexpr int kLevels = 2;          // above the first
-constexpr float kMaxReturn = 1.0F;  // pixels; limit of the forward-backward error
+constexpr int kHalved = 480;  // columns of images from which on flow is computed at half the resolution
+constexpr int kLevels = 2;    // above the first
 
 // Square blocks of the image, so many along a row, and which of them hold a corner.
 class Blocks {
@@ -96,8 +96,8 @@ std::vector<std::optional<cv::Point2f>> track_points(const FlowPyramid& from, co
   return result;
 }
 
-std::vector<bool> are_tracked_back(const FlowPyramid& from, const FlowPyramid& to,
-                                   const std::vector<CornerMatch>& matches) {
+std::vector<float> return_errors(const FlowPyramid& from, const FlowPyramid& to,
+                                 const std::vector<CornerMatch>& matches) {
   std::vector<cv::Point2f> found;
   std::vector<cv::Point2f> backward;
   for (const CornerMatch& match : matches) {
@@ -106,12 +106,12 @@ std::vector<bool> are_tracked_back(const FlowPyramid& from, const FlowPyramid& t
   }
   // It starts near its solution, so that the finest level suffices.
   const auto returned = lucas_kanade(to, from, found, backward, 0);
-  std::vector<bool> result(matches.size());
+  std::vector<float> errors(matches.size(), std::numeric_limits<float>::infinity());
   for (std::size_t i = 0; i < matches.size(); ++i) {
     const cv::Point2f error = backward[i] - matches[i].from->pixel;
-    result[i] = returned[i] != 0 && std::hypot(error.x, error.y) <= kMaxReturn;
+    if (returned[i] != 0) errors[i] = std::hypot(error.x, error.y);
   }
-  return result;
+  return errors;
 }
 
 void CornerSelection::replenish(std::vector<Corner>& corners, const std::vector<cv::Point2f>& points,

@@ -55,10 +55,10 @@ std::vector<std::optional<cv::Point2f>> track_points(const FlowPyramid& from, co
                                                      const std::vector<cv::Point2f>& points,
                                                      const std::vector<cv::Point2f>& guess);
 
-/// Forward-backward check: whether each corner, tracked from one pyramid to another, is tracked back to where
-/// it was.
-std::vector<bool> are_tracked_back(const FlowPyramid& from, const FlowPyramid& to,
-                                   const std::vector<CornerMatch>& matches);
+/// Forward-backward check: how far from where it was each corner, tracked from one pyramid to another, is
+/// tracked back to; pixels, infinite if it is lost.
+std::vector<float> return_errors(const FlowPyramid& from, const FlowPyramid& to,
+                                 const std::vector<CornerMatch>& matches);
 
 /// Chooses the corners that are tracked from a frame on: one for each small block of the image.
 class CornerSelection {
