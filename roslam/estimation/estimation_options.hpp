@@ -12,10 +12,9 @@ struct ROSLAM_EXPORT MeasurementNoise {
   double depth_sigma_growth =
       0.004;  ///< 1/metre: depth noise grows with the square of the distance (Khoshelham 2012)
 
-  /// Squared errors above the chi-squared limit are down-weighted (Huber); above this many times the limit
-  /// they are outliers. Rejection at the limit itself would drop measurements that bundle adjustment can
-  /// still fit by moving the landmark.
-  double outlier_factor = 4.0;
+  /// Squared errors above the chi-squared limit (95 %) are down-weighted (Huber); above this many times the
+  /// limit they are outliers. A larger factor lets wrong matches support a wrong pose.
+  double outlier_factor = 1.0;
 
   double sigma_of_depth(double depth) const { return depth_sigma + depth_sigma_growth * depth * depth; }
 

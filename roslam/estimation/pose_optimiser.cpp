@@ -19,7 +19,7 @@ using Measurements = std::vector<PoseMeasurement>;
 struct NormalEquations {
   Matrix6d hessian = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
-  double cost = 0.0;  // sum of squared errors, those beyond the chi-squared limit after Huber if robust
+  double cost = 0.0;  // sum of squared errors, those beyond the chi-squared limit after Huber
 };
 
 double huber(double squared, double limit) {
@@ -27,13 +27,11 @@ double huber(double squared, double limit) {
 }
 
 // Adds one measurement; T_camera_world is perturbed from the left.
-void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, bool robust,
-         NormalEquations& system) {
+void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, NormalEquations& system) {
   const double limit = chi_squared_limit(term.measurement);
   if (point_camera.z() <= kMinDepth) {
     // No pose is better for moving a point behind the camera: it costs what an outlier does.
-    const double most = outlier_limit(term.measurement);
-    system.cost += robust ? huber(most, limit) : most;
+    system.cost += huber(outlier_limit(term.measurement), limit);
     return;
   }
   const Eigen::Vector3d error = term.error(point_camera);
@@ -42,19 +40,17 @@ void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, boo
   jacobian.leftCols<3>() = by_point;
   jacobian.rightCols<3>() = -by_point * skew(point_camera);
   const double squared = error.squaredNorm();
-  const double weight = robust && squared > limit ? std::sqrt(limit / squared) : 1.0;
+  const double weight = squared > limit ? std::sqrt(limit / squared) : 1.0;
   system.hessian.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose(), weight);
   system.gradient.noalias() += weight * jacobian.transpose() * error;
-  system.cost += robust ? huber(squared, limit) : squared;
+  system.cost += huber(squared, limit);
 }
 
-NormalEquations linearise(const Camera& camera, const Measurements& measurements, const OptimisedPose& pose,
-                          bool robust) {
+NormalEquations linearise(const Camera& camera, const Measurements& measurements, const OptimisedPose& pose) {
   NormalEquations system;
   for (std::size_t i = 0; i < measurements.size(); ++i) {
     if (!pose.is_inlier[i]) continue;
-    add({camera, measurements[i].measurement}, pose.T_camera_world * measurements[i].point_world, robust,
-        system);
+    add({camera, measurements[i].measurement}, pose.T_camera_world * measurements[i].point_world, system);
   }
   system.hessian.diagonal().array() += 1e-9;  // keeps a degenerate system solvable
   return system;
@@ -62,11 +58,10 @@ NormalEquations linearise(const Camera& camera, const Measurements& measurements
 
 // Gauss-Newton on the inliers. A step that raises the cost is taken back and tried again with damping
 // (Levenberg-Marquardt). False if the system cannot be solved.
-bool minimise(const Camera& camera, const Measurements& measurements, bool robust, int iterations,
-              OptimisedPose& pose) {
+bool minimise(const Camera& camera, const Measurements& measurements, int iterations, OptimisedPose& pose) {
   constexpr double kFirstDamping = 1e-3;
   constexpr double kRounding = 1e-9;  // share of the cost that rounding may raise it by
-  NormalEquations system = linearise(camera, measurements, pose, robust);
+  NormalEquations system = linearise(camera, measurements, pose);
   double damping = 0.0;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     Matrix6d hessian = system.hessian;
@@ -76,7 +71,7 @@ bool minimise(const Camera& camera, const Measurements& measurements, bool robus
     const SE3 before = pose.T_camera_world;
     pose.T_camera_world = SE3::exp(step) * before;
     if (step.head<3>().norm() < kSmallTranslation && step.tail<3>().norm() < kSmallRotation) break;
-    const NormalEquations next = linearise(camera, measurements, pose, robust);
+    const NormalEquations next = linearise(camera, measurements, pose);
     if (next.cost <= system.cost * (1.0 + kRounding)) {
       system = next;
       damping *= 0.1;
@@ -112,8 +107,7 @@ OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurem
   OptimisedPose result{initial_T_camera_world, std::vector<bool>(measurements.size(), true),
                        static_cast<int>(measurements.size())};
   for (int round = 0; round < options.rounds && result.inliers >= 3; ++round) {
-    const bool robust = round < options.rounds - 1;
-    if (!minimise(camera, measurements, robust, options.iterations, result)) return failed;
+    if (!minimise(camera, measurements, options.iterations, result)) return failed;
     classify(camera, measurements, result);
   }
   return result.inliers < 3 || !result.T_camera_world.is_finite() ? failed : result;

@@ -23,10 +23,9 @@ struct OptimisedPose {
   int inliers = 0;
 };
 
-/// The camera pose that fits the measurements best: Gauss-Newton on reprojection and inverse depth errors,
-/// with Huber weights in all rounds but the last. After each round, measurements above outlier_limit are
-/// excluded; they may become inliers again later. With fewer than three inliers the initial pose is returned,
-/// without inliers.
+/// The camera pose that fits the measurements best: Gauss-Newton on reprojection and inverse depth errors
+/// with Huber weights. After each round, measurements above outlier_limit are excluded; they may become
+/// inliers again later. With fewer than three inliers the initial pose is returned, without inliers.
 OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurement>& measurements,
                             const SE3& initial_T_camera_world, const PoseOptimiserOptions& options = {});
 
