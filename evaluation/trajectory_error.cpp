@@ -83,14 +83,30 @@ double coverage(const Trajectory& truth, const std::vector<double>& times) {
   return duration > 0.0 ? std::min(1.0, covered / duration) : 0.0;
 }
 
+// The error of the motion from one pair to another.
+SE3 motion_error(const PosePair& from, const PosePair& to, double scale) {
+  const SE3 true_motion = from.truth.T_world_camera.inverse() * to.truth.T_world_camera;
+  const SE3 motion = from.estimate.T_world_camera.inverse() * to.estimate.T_world_camera;
+  return true_motion.inverse() * SE3(motion.rotation(), scale * motion.translation());
+}
+
+std::vector<WrongFrame> wrong_frames(const std::vector<PosePair>& pairs, double scale,
+                                     const TrajectoryErrorOptions& options) {
+  std::vector<WrongFrame> result;
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    const SE3 error = motion_error(pairs[i - 1], pairs[i], scale);
+    const WrongFrame frame{pairs[i].estimate.timestamp, error.translation().norm(), error.angle() * kDegrees};
+    if (frame.metres > options.wrong_metres || frame.degrees > options.wrong_degrees) result.push_back(frame);
+  }
+  return result;
+}
+
 class RelativeErrors {
  public:
   RelativeErrors(const std::vector<PosePair>& pairs, double scale) : pairs_(pairs), scale_(scale) {}
 
   void add(std::size_t i, std::size_t j) {
-    const SE3 true_motion = pairs_[i].truth.T_world_camera.inverse() * pairs_[j].truth.T_world_camera;
-    const SE3 motion = pairs_[i].estimate.T_world_camera.inverse() * pairs_[j].estimate.T_world_camera;
-    const SE3 error = true_motion.inverse() * SE3(motion.rotation(), scale_ * motion.translation());
+    const SE3 error = motion_error(pairs_[i], pairs_[j], scale_);
     translation_.push_back(error.translation().norm());
     rotation_.push_back(error.angle() * kDegrees);
   }
@@ -151,6 +167,8 @@ Alignment aligned(const std::vector<PosePair>& pairs, AlignmentModel model) {
 void TrajectoryErrorOptions::validate() const {
   association.validate();
   if (!(span > 0.0 && std::isfinite(span))) throw OptionsError("span must be a positive number of seconds");
+  if (!(wrong_metres > 0.0)) throw OptionsError("wrong_metres must be positive");
+  if (!(wrong_degrees > 0.0)) throw OptionsError("wrong_degrees must be positive");
 }
 
 double longest_step(const std::vector<double>& timestamps) {
@@ -185,6 +203,7 @@ TrajectoryError evaluate_trajectory(const Trajectory& truth, const Trajectory& e
                                                 : std::numeric_limits<double>::quiet_NaN();
   result.rpe_frame = error_per_frame(pairs, times, result.alignment.scale);
   result.rpe_span = error_over_span(pairs, times, options.span, result.alignment.scale);
+  result.wrong_frames = wrong_frames(pairs, result.alignment.scale, options);
   return result;
 }
 

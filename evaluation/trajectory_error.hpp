@@ -15,7 +15,9 @@ namespace roslam::evaluation {
 struct TrajectoryErrorOptions {
   AssociationOptions association;
   AlignmentModel alignment = AlignmentModel::kRigid;
-  double span = 1.0;  ///< seconds, > 0: interval of the longer relative pose error
+  double span = 1.0;           ///< seconds, > 0: interval of the longer relative pose error
+  double wrong_metres = 0.08;  ///< > 0: error of a step from which on a frame is wrong
+  double wrong_degrees = 4.0;  ///< > 0: the same of its rotation
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -32,6 +34,13 @@ struct PoseError {
 struct RelativeError {
   Statistics translation;  ///< metres
   Statistics rotation;     ///< degrees
+};
+
+/// A frame whose step from the tracked frame before is off by more than the limits.
+struct WrongFrame {
+  double timestamp = 0.0;  ///< seconds
+  double metres = 0.0;     ///< error of the step
+  double degrees = 0.0;
 };
 
 /// How well an estimated trajectory follows the true one, after Sturm, Engelhard, Endres, Burgard, Cremers:
@@ -52,7 +61,8 @@ struct TrajectoryError {
       0.0;                  ///< RMSE of the ATE as a percentage of path_length; NaN if the truth did not move
   RelativeError rpe_frame;  ///< over consecutive pairs; the steps across gaps in tracking are left out
   RelativeError rpe_span;   ///< over options.span seconds
-  std::vector<PoseError> poses;  ///< one a pair, in the order of time
+  std::vector<WrongFrame> wrong_frames;  ///< steps across gaps in tracking included
+  std::vector<PoseError> poses;          ///< one a pair, in the order of time
 };
 
 /// Throws InputError if the trajectories do not overlap in time (naming both ranges), if fewer than three

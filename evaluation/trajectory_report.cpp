@@ -27,6 +27,7 @@ std::vector<Column> absolute_columns(bool with_scale) {
   std::vector<Column> columns{
       {"pairs", 0, [](const auto& e) { return static_cast<double>(e.pairs); }},
       {"covered %", 1, [](const auto& e) { return 100.0 * e.coverage; }},
+      {"wrong frames", 0, [](const auto& e) { return static_cast<double>(e.wrong_frames.size()); }},
       {"path m", 3, [](const auto& e) { return e.path_length; }},
       {"RMSE m", 4, [](const auto& e) { return e.ate.rmse; }},
       {"mean m", 4, [](const auto& e) { return e.ate.mean; }},
@@ -93,6 +94,15 @@ Json json_of(const RelativeError& error) {
   return {{"translation_m", json_of(error.translation)}, {"rotation_deg", json_of(error.rotation)}};
 }
 
+Json json_of(const std::vector<WrongFrame>& frames) {
+  Json json = Json::array();
+  for (const WrongFrame& frame : frames)
+    json.push_back({{"time_s", frame.timestamp},
+                    {"step_error_m", number(frame.metres)},
+                    {"step_error_deg", number(frame.degrees)}});
+  return json;
+}
+
 Json json_of(const EvaluatedTrajectory& trajectory) {
   const TrajectoryError& e = trajectory.error;
   return {{"name", trajectory.name},
@@ -101,6 +111,8 @@ Json json_of(const EvaluatedTrajectory& trajectory) {
           {"poses", e.estimate_poses},
           {"pairs", e.pairs},
           {"coverage", number(e.coverage)},
+          {"wrong_frames", e.wrong_frames.size()},
+          {"wrong", json_of(e.wrong_frames)},
           {"path_length_m", number(e.path_length)},
           {"scale", number(e.alignment.scale)},
           {"ate_m", json_of(e.ate)},
@@ -112,6 +124,7 @@ Json json_of(const EvaluatedTrajectory& trajectory) {
 Json json_of_median(const std::vector<EvaluatedTrajectory>& runs) {
   const auto of = [&](const Value& value) { return number(median_of(runs, value)); };
   return {{"coverage", of([](const auto& e) { return e.coverage; })},
+          {"wrong_frames", of([](const auto& e) { return static_cast<double>(e.wrong_frames.size()); })},
           {"ate_rmse_m", of([](const auto& e) { return e.ate.rmse; })},
           {"ate_median_m", of([](const auto& e) { return e.ate.median; })},
           {"ate_max_m", of([](const auto& e) { return e.ate.max; })},

@@ -79,6 +79,9 @@ TEST_F(EvaluateTrajectory, PrintsOneJsonObjectWithRunsMedianAndOthers) {
   EXPECT_NEAR(report["against"][0]["ate_m"]["rmse"].get<double>(), 0.1, 1e-6);
   EXPECT_NEAR(report["estimates"][0]["ate_m"]["max"].get<double>(), 0.01, 1e-6);
   EXPECT_EQ(report["estimates"][0]["pairs"], 80);
+  EXPECT_EQ(report["estimates"][0]["wrong_frames"], 0);
+  EXPECT_GT(report["against"][0]["wrong_frames"].get<int>(), 0);
+  EXPECT_EQ(report["against"][0]["wrong"].size(), report["against"][0]["wrong_frames"].get<std::size_t>());
   EXPECT_EQ(report["alignment"], "se3");
   EXPECT_NEAR(report["estimates"][0]["rpe_frame"]["translation_m"]["rmse"].get<double>(), 0.02, 1e-6);
 }

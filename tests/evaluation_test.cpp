@@ -250,6 +250,32 @@ TEST(RelativeError, IsEmptyWhereTheTrajectoryIsShorterThanTheSpan) {
   EXPECT_EQ(result.rpe_frame.translation.count, 9u);
 }
 
+// A drift is no wrong frame; a jump is, as is the way back, whether or not frames between were tracked.
+TEST(WrongFrames, AreThoseWhoseStepIsOff) {
+  const Trajectory truth = winding(100, 0.1);
+  Trajectory estimate;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    SE3 pose = truth[i].T_world_camera;
+    pose = SE3(so3_exp({0, 0, 0.002 * static_cast<double>(i)}), Eigen::Vector3d::Zero()) * pose;
+    if (i >= 30 && i < 33) pose = pose * SE3(Eigen::Quaterniond::Identity(), {0.1, 0.0, 0.0});
+    if (i == 50) pose = pose * SE3(so3_exp({5.0 * kRadians, 0, 0}), Eigen::Vector3d::Zero());
+    if (i >= 80) pose = pose * SE3(Eigen::Quaterniond::Identity(), {0.0, 0.0, 0.2});
+    if (i < 70 || i >= 80) estimate.push_back({truth[i].timestamp, pose});
+  }
+  std::vector<double> times;
+  const auto wrong = evaluate_trajectory(truth, estimate).wrong_frames;
+  for (const WrongFrame& frame : wrong) times.push_back(frame.timestamp);
+  ASSERT_EQ(times.size(), 5U);
+  const std::size_t expected[] = {30, 33, 50, 51, 80};
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(times[i], truth[expected[i]].timestamp) << i;
+  EXPECT_NEAR(wrong[0].metres, 0.1, 0.01);
+  EXPECT_NEAR(wrong[2].degrees, 5.0, 0.2);
+  TrajectoryErrorOptions lenient;
+  lenient.wrong_metres = 0.5;
+  lenient.wrong_degrees = 10.0;
+  EXPECT_TRUE(evaluate_trajectory(truth, estimate, lenient).wrong_frames.empty());
+}
+
 TEST(TrajectoryErrors, ToleratesAnOffsetInTimeUpToTheTolerance) {
   const Trajectory truth = winding(90, 0.1);
   Trajectory estimate = truth;
@@ -291,6 +317,12 @@ TEST(TrajectoryErrors, OptionsNameWhatIsOutOfRange) {
   }
   TrajectoryErrorOptions options;
   options.span = 0.0;
+  EXPECT_THROW(options.validate(), OptionsError);
+  options = {};
+  options.wrong_metres = 0.0;
+  EXPECT_THROW(options.validate(), OptionsError);
+  options = {};
+  options.wrong_degrees = std::nan("");
   EXPECT_THROW(options.validate(), OptionsError);
 }
 
