@@ -75,6 +75,7 @@ Json frames_json(const Slam& slam, const RunResults& summary, const FrameSource&
           {"dropped_in_a_row", summary.longest_gap},
           {"by_state", by_state},
           {"skipped", counts_json(counts.skipped)},
+          {"doubted_poses", counts_json(slam.doubted_poses())},
           {"clock_resets", slam.clock_resets()},
           {"without_depth", summary.without_depth},
           {"skipped_depth", counts_json(source.skipped_depth())},

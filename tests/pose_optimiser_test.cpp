@@ -179,6 +179,30 @@ TEST_F(OptimisePose, ConvergesAsFastAsTheRightDerivativesAllow) {
 }
 
 // The derivative of the error by a motion of the camera, as undamped() above and the optimiser use it.
+// Normalised estimation error squared (Bar-Shalom 2001, 5.4): its mean is the number of degrees of freedom,
+// 6, if the covariance is true, whatever the unit of the noise.
+TEST_F(OptimisePose, TheCovarianceIsThatOfTheError) {
+  for (const double scale : {0.3, 1.0}) {
+    double sum = 0.0;
+    constexpr int kTrials = 400;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      Measurements measurements = scene(150, true);
+      std::normal_distribution<double> noise(0.0, scale);
+      for (auto& m : measurements) {
+        m.measurement.pixel += Eigen::Vector2d(noise(random_), noise(random_)) / m.measurement.pixel_weight;
+        m.measurement.depth = 1.0 / (1.0 / m.measurement.depth + noise(random_) / m.measurement.depth_weight);
+      }
+      const OptimisedPose pose = optimise_pose(camera_, measurements, random_motion(0.02, 0.01) * truth_);
+      const Vector6d error = (truth_ * pose.T_camera_world.inverse()).log();
+      sum += error.dot(pose.covariance.ldlt().solve(error));
+    }
+    // Its standard deviation is sqrt(12 / 400) = 0.17. Huber's weights and rejection at the limit count some
+    // of the noise as outliers.
+    EXPECT_GT(sum / kTrials, 5.0) << scale;
+    EXPECT_LT(sum / kTrials, 8.0) << scale;
+  }
+}
+
 TEST_F(OptimisePose, DerivativesByThePoseAgreeWithNumericOnes) {
   const auto [point_world, measurement] = measure({0.4, -0.3, 2.2}, true, {3.0, -2.0});
   const ReprojectionError term{camera_, measurement};
@@ -288,6 +312,16 @@ TEST_F(DegenerateInput, PointsOnALine) {
     const auto pose = expect_sound(measurements, random_motion(0.05, 0.02) * truth_);
     EXPECT_TRUE(pose.T_camera_world.is_finite());
     EXPECT_LE(cost(measurements, pose.T_camera_world, true), 1e-3) << "a pose fits, though not only one";
+  }
+}
+
+TEST_F(DegenerateInput, TheCovarianceTellsWhatNothingConstrains) {
+  Measurements far;
+  for (int i = 0; i < 100; ++i) far.push_back(measure(random_point(900.0, 1000.0), false));
+  const Matrix6d covariance = optimise_pose(camera_, far, truth_).covariance;
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_GT(std::sqrt(covariance(k, k)), 0.1) << k;           // metres
+    EXPECT_LT(std::sqrt(covariance(k + 3, k + 3)), 2e-3) << k;  // radians
   }
 }
 

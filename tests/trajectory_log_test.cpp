@@ -123,6 +123,17 @@ TEST_F(FrameLog, FramesWithoutAPoseAreCountedAndNotInTheTrajectory) {
   EXPECT_EQ(log_.frames_by_submap(map_), (Frames{{SubmapId{0}, 3}}));
 }
 
+TEST_F(FrameLog, PredictedPosesAreInterpolatedBetweenMeasuredOnes) {
+  const KeyframeId a = add_keyframe(at(0.0));
+  add(0, at(0.0), a);
+  add(1, at(0.3), a, TrackingState::kPredicted);
+  add(2, at(0.6), a, TrackingState::kPredicted);
+  add(3, at(0.15), a);
+  add(4, at(0.9), a, TrackingState::kPredicted);  // nothing was measured after it
+  expect_trajectory(SubmapId{0},
+                    {{0.0, at(0.0)}, {0.25, at(0.05)}, {0.5, at(0.1)}, {0.75, at(0.15)}, {1.0, at(0.9)}});
+}
+
 TEST_F(FrameLog, CountsRejectedFramesByReasonAndResetsOfTheClock) {
   log_.add_rejected(RejectReason::kMask);
   log_.add_rejected(RejectReason::kMask);

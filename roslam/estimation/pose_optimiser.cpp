@@ -2,6 +2,7 @@
 #include "roslam/estimation/pose_optimiser.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "roslam/common/error.hpp"
@@ -19,7 +20,8 @@ using Measurements = std::vector<PoseMeasurement>;
 struct NormalEquations {
   Matrix6d hessian = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
-  double cost = 0.0;  // sum of squared errors, those beyond the chi-squared limit after Huber
+  double weighted = 0.0;  // sum of squared errors, weighted
+  double cost = 0.0;      // sum of squared errors, those beyond the chi-squared limit after Huber
 };
 
 double huber(double squared, double limit) {
@@ -43,7 +45,17 @@ void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, Nor
   const double weight = squared > limit ? std::sqrt(limit / squared) : 1.0;
   system.hessian.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose(), weight);
   system.gradient.noalias() += weight * jacobian.transpose() * error;
+  system.weighted += weight * squared;
   system.cost += huber(squared, limit);
+}
+
+// The inverse of the information of the inliers, times the variance of unit weight.
+Matrix6d covariance_of(const NormalEquations& system, std::size_t rows) {
+  constexpr double kLeastScale = 0.05;  // of few measurements that happen to agree
+  const double freedom = std::max(1.0, static_cast<double>(rows) - 6.0);
+  const Matrix6d information = system.hessian.selfadjointView<Eigen::Lower>();
+  const Matrix6d inverse = information.ldlt().solve(Matrix6d::Identity());
+  return std::max(kLeastScale, system.weighted / freedom) * 0.5 * (inverse + inverse.transpose());
 }
 
 NormalEquations linearise(const Camera& camera, const Measurements& measurements, const OptimisedPose& pose) {
@@ -103,14 +115,24 @@ void PoseOptimiserOptions::validate() const {
 
 OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurement>& measurements,
                             const SE3& initial_T_camera_world, const PoseOptimiserOptions& options) {
-  const OptimisedPose failed{initial_T_camera_world, std::vector<bool>(measurements.size(), false), 0};
-  OptimisedPose result{initial_T_camera_world, std::vector<bool>(measurements.size(), true),
-                       static_cast<int>(measurements.size())};
+  OptimisedPose failed;
+  failed.T_camera_world = initial_T_camera_world;
+  failed.is_inlier.assign(measurements.size(), false);
+  OptimisedPose result;
+  result.T_camera_world = initial_T_camera_world;
+  result.is_inlier.assign(measurements.size(), true);
+  result.inliers = static_cast<int>(measurements.size());
   for (int round = 0; round < options.rounds && result.inliers >= 3; ++round) {
     if (!minimise(camera, measurements, options.iterations, result)) return failed;
     classify(camera, measurements, result);
   }
-  return result.inliers < 3 || !result.T_camera_world.is_finite() ? failed : result;
+  if (result.inliers < 3 || !result.T_camera_world.is_finite()) return failed;
+  std::size_t rows = 0;
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    if (result.is_inlier[i]) rows += measurements[i].measurement.has_depth() ? 3 : 2;
+  }
+  result.covariance = covariance_of(linearise(camera, measurements, result), rows);
+  return result;
 }
 
 }  // namespace roslam

@@ -21,6 +21,11 @@ struct OptimisedPose {
   SE3 T_camera_world;
   std::vector<bool> is_inlier;  ///< one per measurement
   int inliers = 0;
+
+  /// Of the pose, perturbed from the left: T = exp(x) T_camera_world with x = (translation m, rotation rad)
+  /// in the camera frame. By the inliers with their weights and the scale of their errors, as if landmarks
+  /// were exact; zero if there is no pose.
+  Matrix6d covariance = Matrix6d::Zero();
 };
 
 /// The camera pose that fits the measurements best: Gauss-Newton on reprojection and inverse depth errors

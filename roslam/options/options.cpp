@@ -24,6 +24,7 @@ void Options::validate() const {
   local_map.validate();
   relocaliser.validate();
   tracker.validate();
+  plausible.validate();
   keyframes.validate();
   landmarks.validate();
   fusion.validate();

@@ -41,6 +41,7 @@ struct ROSLAM_EXPORT Options {
   LocalMapOptions local_map;
   RelocaliserOptions relocaliser;
   TrackerOptions tracker;
+  PlausibilityOptions plausible;
   KeyframePolicyOptions keyframes;
   NewLandmarkOptions landmarks;
   FusionOptions fusion;

@@ -71,6 +71,10 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("tracker", "max_wait_to_start", o.tracker.max_wait_to_start);
   visit("tracker", "recently_lost_frames", o.tracker.recently_lost_frames);
   visit("tracker", "new_submap_after_lost", o.tracker.new_submap_after_lost);
+  visit("plausible", "min_found_share", o.plausible.min_found_share);
+  visit("plausible", "max_speed", o.plausible.max_speed);
+  visit("plausible", "max_acceleration", o.plausible.max_acceleration);
+  visit("plausible", "max_turn_rate", o.plausible.max_turn_rate);
   visit("keyframes", "enabled", o.keyframes.enabled);
   visit("keyframes", "max_interval", o.keyframes.max_interval);
   visit("keyframes", "min_interval", o.keyframes.min_interval);

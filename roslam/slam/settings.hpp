@@ -13,7 +13,7 @@ namespace roslam {
 // What each component takes of the options.
 
 inline Tracker::Settings tracker_settings(const Options& o) {
-  return {o.tracker, o.matcher, o.pose, o.local_map, o.geometric_verifier, o.relocaliser, o.noise};
+  return {o.tracker, o.plausible, o.matcher, o.pose, o.local_map, o.geometric_verifier, o.relocaliser, o.noise};
 }
 
 inline DynamicObjectDetector::Settings detector_settings(const Options& o) {

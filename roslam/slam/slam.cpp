@@ -137,6 +137,12 @@ const std::map<TrackingState, std::size_t>& Slam::frames_by_state() const { retu
 const std::map<RejectReason, std::size_t>& Slam::rejected() const { return impl_->log.rejected(); }
 std::size_t Slam::clock_resets() const { return impl_->log.clock_resets(); }
 
+std::map<std::string, std::size_t> Slam::doubted_poses() const {
+  std::map<std::string, std::size_t> doubted;
+  for (const auto& [doubt, count] : impl_->tracker.doubts()) doubted[std::string(describe(doubt))] = count;
+  return doubted;
+}
+
 StageTimes Slam::times() const {
   StageTimes all = impl_->times;
   all.add_all(impl_->mapping.times());

@@ -75,7 +75,8 @@ class ROSLAM_EXPORT Slam {
   void cancel();
 
   /// Poses of all frames tracked in the main submap, with all later corrections of the map, in the order of
-  /// frames.
+  /// frames. Poses that were predicted while dynamic objects hid the scene are interpolated between the
+  /// measured ones before and after them.
   Trajectory trajectory() const;
 
   /// Poses of this session's keyframes in the main submap that are still in the map.
@@ -138,6 +139,10 @@ class ROSLAM_EXPORT Slam {
 
   /// How often the source's clock was found to have restarted.
   std::size_t clock_resets() const;
+
+  /// How many estimated poses were not taken for the true ones, by reason (PlausibilityOptions, too few
+  /// inliers). Another pose may have been found for the same frame.
+  std::map<std::string, std::size_t> doubted_poses() const;
 
   /// Processor time of every stage so far.
   StageTimes times() const;

@@ -79,8 +79,8 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   result.warnings = std::move(observation.warnings);
 
   std::unique_lock map_lock(map_mutex);
-  FrameHint hint{result.dynamic_objects.T_camera_world, observation.hidden_share, observation.may_start,
-                 [&] { return similar_keyframes(*observation.view); }};
+  FrameHint hint{result.dynamic_objects.T_camera_world, observation.hidden_share, frame.depth,
+                 observation.may_start, [&] { return similar_keyframes(*observation.view); }};
   // A pose in the map as it was before a correction is no hint any more.
   if (front_end.follow_corrections(map, tracker.last_pose())) hint.T_camera_world.reset();
   TrackedFrame tracked = tracker.track(observation.view, frame.timestamp, hint);

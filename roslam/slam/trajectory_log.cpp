@@ -2,6 +2,7 @@
 #include "roslam/slam/trajectory_log.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace roslam {
 
@@ -14,6 +15,15 @@ std::set<SubmapId> loaded_submaps(const Map& map) {
     if (keyframe.session < map.session()) submaps.insert(keyframe.submap);
   }
   return submaps;
+}
+
+// Replaces the poses between two measured ones by their interpolation.
+void interpolate_between(Trajectory& trajectory, std::size_t from, std::size_t to) {
+  const Trajectory measured{trajectory[from], trajectory[to]};
+  for (std::size_t i = from + 1; i < to; ++i) {
+    if (const auto pose = pose_at(measured, trajectory[i].timestamp, std::numeric_limits<double>::infinity()))
+      trajectory[i] = *pose;
+  }
 }
 }  // namespace
 
@@ -58,10 +68,18 @@ std::set<SubmapId> TrajectoryLog::submaps_on_objects(const Map& map) const {
 
 Trajectory TrajectoryLog::trajectory(const Map& map, SubmapId submap) const {
   Trajectory result;
+  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  std::size_t measured = kNone;  // position of the last one since which no pose is missing
   for (const auto& record : records_) {
-    if (!record.reference.is_valid() || map.submap_of(record.reference) != submap) continue;
+    if (!record.reference.is_valid() || map.submap_of(record.reference) != submap) {
+      measured = kNone;
+      continue;
+    }
     const SE3 T_camera_world = record.T_camera_reference * map.T_camera_world(record.reference);
     result.push_back({record.timestamp, T_camera_world.inverse()});
+    if (!record.is_measured) continue;
+    if (measured != kNone) interpolate_between(result, measured, result.size() - 1);
+    measured = result.size() - 1;
   }
   return result;
 }

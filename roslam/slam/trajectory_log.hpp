@@ -36,7 +36,8 @@ class TrajectoryLog {
   const std::map<RejectReason, std::size_t>& rejected() const { return rejected_; }
   std::size_t clock_resets() const { return clock_resets_; }
 
-  /// Poses of the frames tracked in a submap, in the order of frames.
+  /// Poses of the frames tracked in a submap, in the order of frames. A pose that was predicted while the
+  /// scene was hidden is interpolated between the measured ones before and after it, if there are such.
   Trajectory trajectory(const Map& map, SubmapId submap) const;
 
   /// The pose of a keyframe in the camera frame of an earlier frame: T_frame_keyframe. Nothing if that frame

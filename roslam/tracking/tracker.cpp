@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/tracking/tracker.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/stopwatch.hpp"
@@ -10,9 +12,14 @@
 namespace roslam {
 
 namespace {
-// Marks matches with points of the last frame that have no landmark (ORB-SLAM's temporal points): they are
-// used for the pose of this frame only.
-constexpr LandmarkId kUnmapped{LandmarkId::kNone - 1};
+// Marks points of the frame that match a temporary point.
+constexpr LandmarkId kTemporary{LandmarkId::kNone - 1};
+
+// Standard deviation of the position along its least certain direction, metres.
+double position_sigma(const Matrix6d& covariance) {
+  const Eigen::Matrix3d position = covariance.topLeftCorner<3, 3>();
+  return std::sqrt(std::max(0.0, position.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
+}
 
 // The first camera defines the world frame, assumed level: x forward, y left, z up (REP 103).
 SE3 first_T_camera_world() {
@@ -63,11 +70,13 @@ Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
       map_(map),
       settings_(settings),
       matcher_(settings.matcher),
+      initial_pose_(camera, map, {settings.tracker, settings.matcher, settings.pose, settings.noise}),
       local_map_(settings.local_map),
       relocaliser_(settings.relocaliser,
                    GeometricVerifier(camera, {settings.geometric_verifier, settings.matcher, settings.pose,
                                               settings.noise})) {
   settings.tracker.validate();
+  settings.plausible.validate();
   settings.matcher.validate();
   settings.pose.validate();
   settings.local_map.validate();
@@ -78,8 +87,6 @@ Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
 TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double timestamp,
                             const FrameHint& hint) {
   times_ = {};
-  unmapped_points_.clear();
-  unmapped_positions_.clear();
   TrackedFrame frame;
   frame.timestamp = timestamp;
   frame.landmarks.resize(view->size());
@@ -89,7 +96,7 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   }
 
   const bool was_known = state_ == TrackingState::kTracking || state_ == TrackingState::kPredicted;
-  const bool found = (was_known && follow(frame, hint.T_camera_world)) || relocalise(frame, hint);
+  const bool found = (was_known && follow(frame, hint)) || relocalise(frame, hint);
   if (found) {
     state_ = TrackingState::kTracking;
     frames_lost_ = frames_unrecognised_ = 0;
@@ -152,14 +159,75 @@ std::optional<SE3> Tracker::predicted_pose(double timestamp) const {
   return predict_pose(timestamp);
 }
 
-bool Tracker::follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_world) {
-  const SE3 predicted = T_camera_world.value_or(predict_pose(frame.timestamp));
+// The candidates by predictions are tried first. Where they are refused, or few inliers support the best, the
+// reference keyframe, by descriptors, and the last frame, in a wide search, give others.
+bool Tracker::follow(TrackedFrame& frame, const FrameHint& hint) {
+  if (!last_.reference.is_valid()) return false;
+  const Stopwatch watch;
+  const SE3 T_world_last = last_pose()->inverse();
+  const std::vector<SE3> predicted = predictions(frame.timestamp, hint.T_camera_world);
+  std::vector<PoseCandidate> candidates;
+  const auto add = [&](std::optional<PoseCandidate> candidate) {
+    if (candidate) candidates.push_back(std::move(*candidate));
+  };
+  bool is_trusted = false;
+  for (const SE3& pose : predicted) {
+    add(initial_pose_.from_last_frame(*frame.view, last_, T_world_last, pose, 1.0F));
+    is_trusted |= !candidates.empty() && candidates.back().inliers >= settings_.tracker.trusted_inliers;
+  }
+  times_.match_frame += watch.seconds();
+  if (is_trusted && accept_best(frame, std::exchange(candidates, {}), hint)) return true;
+  const Stopwatch second_watch;
+  if (const Keyframe* reference = map_.find(last_.reference))
+    add(initial_pose_.from_keyframe(*frame.view, *reference, T_world_last.inverse()));
   constexpr float kWider = 3.0F;
-  // Without a motion estimate a search around the projection may match wrong points: match by descriptors.
-  const bool matched = ((velocity_ || T_camera_world) && match_last_frame(frame, predicted, 1.0F)) ||
-                       match_reference(frame) || match_last_frame(frame, predicted, kWider);
-  return matched && last_.reference.is_valid() &&
-         refine_with_local_map(frame, map_.T_camera_anchor(last_.reference).first);
+  add(initial_pose_.from_last_frame(*frame.view, last_, T_world_last,
+                                    predicted.empty() ? T_world_last.inverse() : predicted.front(), kWider));
+  times_.match_frame += second_watch.seconds();
+  return accept_best(frame, std::move(candidates), hint);
+}
+
+// Refines the candidates with the local map, those with most inliers first, until one is accepted.
+bool Tracker::accept_best(TrackedFrame& frame, std::vector<PoseCandidate> candidates, const FrameHint& hint) {
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const auto& a, const auto& b) { return a.inliers > b.inliers; });
+  const KeyframeId near = map_.T_camera_anchor(last_.reference).first;
+  for (PoseCandidate& candidate : candidates) {
+    refine_with_local_map(frame, std::move(candidate), near, hint.depth);
+    if (is_accepted(frame, settings_.tracker.min_inliers)) return true;
+  }
+  return false;
+}
+
+PoseDoubt Tracker::doubt_of(const TrackedFrame& frame, int min_inliers) const {
+  if (frame.inliers < min_inliers) return PoseDoubt::kFewInliers;
+  if (frame.inliers < settings_.plausible.min_found_share * frame.visible) return PoseDoubt::kFewFound;
+  const bool is_same_submap =
+      last_.reference.is_valid() && map_.submap_of(last_.reference) == map_.submap_of(frame.reference);
+  if (!is_same_submap) return PoseDoubt::kNone;
+  MotionState last{last_.timestamp, last_pose()->inverse(), position_sigma(last_.covariance), {}};
+  if (velocity_) last.velocity = -(last.T_world_camera.rotation() * velocity_->head<3>());
+  return check_motion(last, frame.timestamp, frame.T_camera_world->inverse(),
+                      position_sigma(frame.covariance), settings_.plausible);
+}
+
+bool Tracker::is_accepted(const TrackedFrame& frame, int min_inliers) {
+  const PoseDoubt doubt = doubt_of(frame, min_inliers);
+  if (doubt != PoseDoubt::kNone) ++doubts_[doubt];
+  return doubt == PoseDoubt::kNone;
+}
+
+// By optical flow and by the motion model, unless they agree. Either may be wrong: flow on repeated
+// structure, the motion model where the motion changes.
+std::vector<SE3> Tracker::predictions(double timestamp, const std::optional<SE3>& by_flow) const {
+  std::vector<SE3> result;
+  if (by_flow) result.push_back(*by_flow);
+  if (!velocity_) return result;
+  const SE3 by_motion = predict_pose(timestamp);
+  const bool agrees = by_flow && initial_pose_.disagreement(last_, last_pose()->inverse(), *by_flow,
+                                                            by_motion) < settings_.matcher.frame_radius;
+  if (!agrees) result.push_back(by_motion);
+  return result;
 }
 
 std::optional<SE3> Tracker::last_pose() const {
@@ -179,117 +247,23 @@ SE3 Tracker::predict_pose(double timestamp) const {
   return SE3::exp(*velocity_ * duration) * last;
 }
 
-bool Tracker::match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor) {
-  const Stopwatch watch;
-  frame.landmarks.assign(frame.view->size(), {});
-  const SE3 T_world_last = last_pose()->inverse();
-  const ObservedFrame& last = *last_.view;
-  std::vector<Eigen::Vector3d> positions;
-  std::vector<std::uint32_t> points;
-  std::vector<float> rotations;
-  for (std::size_t i = 0; i < last.size(); ++i) {
-    const LandmarkId id = map_.resolve(last_.landmarks[i]);
-    const Landmark* landmark = map_.find(id);
-    if (landmark == nullptr && last.depths[i] <= 0.0F) continue;
-    const Eigen::Vector3d position =
-        landmark != nullptr ? landmark->position
-                            : T_world_last * camera_.unproject(last.pixels[i].cast<double>(), last.depths[i]);
-    const Eigen::Vector3d in_camera = predicted * position;
-    if (in_camera.z() <= 0.0) continue;
-    const Eigen::Vector2f pixel = camera_.project(in_camera).cast<float>();
-    if (!frame.view->grid.contains(pixel)) continue;
-    const int level = last.levels[i];
-    const float radius =
-        radius_factor * static_cast<float>(settings_.matcher.frame_radius) * map_.scale(level);
-    const int match = matcher_.find({pixel, radius, level - 1, level + 1, static_cast<float>(in_camera.z()),
-                                     settings_.matcher.max_distance, false},
-                                    last.descriptors[i], *frame.view, frame.landmarks);
-    if (match < 0) continue;
-    frame.landmarks[static_cast<std::size_t>(match)] = landmark != nullptr ? id : kUnmapped;
-    positions.push_back(position);
-    points.push_back(static_cast<std::uint32_t>(match));
-    rotations.push_back(last.angles[i] - frame.view->angles[static_cast<std::size_t>(match)]);
-  }
-  const auto keep = consistent_rotation(rotations);
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    if (keep[k]) {
-      positions[kept] = positions[k];
-      points[kept++] = points[k];
-    } else {
-      frame.landmarks[points[k]] = {};
-    }
-  }
-  positions.resize(kept);
-  points.resize(kept);
-  times_.match_frame += watch.seconds();
-  frame.T_camera_world = predicted;
-  const bool good = first_estimate(frame, positions, points);
-  unmapped_points_.clear();
-  unmapped_positions_.clear();
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    if (frame.landmarks[points[k]] != kUnmapped) continue;
-    unmapped_points_.push_back(points[k]);
-    unmapped_positions_.push_back(positions[k]);
-  }
-  std::replace(frame.landmarks.begin(), frame.landmarks.end(), kUnmapped, LandmarkId{});
-  return good;
+// Whether a surface in the image is nearer than the landmark, so that it cannot be seen.
+bool Tracker::is_occluded(const Prediction& predicted, const cv::Mat& depth) const {
+  if (depth.empty()) return false;
+  const Eigen::Vector2d pixel = camera_.distort(predicted.pixel.cast<double>());
+  const cv::Point at(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y())));
+  if (!cv::Rect({0, 0}, depth.size()).contains(at)) return false;
+  const double now = depth.at<float>(at);
+  return now > 0.0 && now < (1.0 - settings_.matcher.depth_tolerance) * static_cast<double>(predicted.depth);
 }
 
-bool Tracker::match_reference(TrackedFrame& frame) {
-  const Keyframe* reference = map_.find(last_.reference);
-  if (reference == nullptr) return false;
-  const Stopwatch watch;
-  std::vector<std::uint32_t> known;
-  for (std::uint32_t i = 0; i < reference->landmarks.size(); ++i) {
-    if (reference->landmarks[i].is_valid()) known.push_back(i);
-  }
-  frame.landmarks.assign(frame.view->size(), {});
-  std::vector<Eigen::Vector3d> positions;
-  std::vector<std::uint32_t> points;
-  for (const auto& [theirs, ours] :
-       match_descriptors(*reference->view, known, *frame.view, settings_.matcher)) {
-    frame.landmarks[ours] = reference->landmarks[theirs];
-    positions.push_back(map_.find(reference->landmarks[theirs])->position);
-    points.push_back(ours);
-  }
-  times_.match_frame += watch.seconds();
-  frame.T_camera_world = last_pose();
-  return first_estimate(frame, positions, points);
-}
-
-bool Tracker::first_estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
-                             const std::vector<std::uint32_t>& points) {
-  return estimate(frame, positions, points, settings_.tracker.min_frame_matches) &&
-         frame.inliers >= settings_.tracker.min_agreement * static_cast<double>(points.size());
-}
-
-// Optimises the pose on matches of image points with world positions; unsets the landmarks of outliers.
-bool Tracker::estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
-                       const std::vector<std::uint32_t>& points, int min_inliers) {
-  if (static_cast<int>(points.size()) < min_inliers) return false;
-  const Stopwatch watch;
-  const ObservedFrame& view = *frame.view;
-  std::vector<PoseMeasurement> measurements(points.size());
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const std::uint32_t i = points[k];
-    measurements[k].point_world = positions[k];
-    measurements[k].measurement = map_.measurement(view, i, settings_.noise);
-  }
-  const OptimisedPose pose = optimise_pose(camera_, measurements, *frame.T_camera_world, settings_.pose);
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    if (!pose.is_inlier[k]) frame.landmarks[points[k]] = {};
-  }
-  frame.T_camera_world = pose.T_camera_world;
-  frame.inliers = pose.inliers;
-  times_.optimise += watch.seconds();
-  return pose.inliers >= min_inliers;
-}
-
-void Tracker::match_local_landmarks(TrackedFrame& frame) {
+void Tracker::match_local_landmarks(TrackedFrame& frame, const cv::Mat& depth) {
   std::vector<bool> is_matched(map_.landmark_slots(), false);
+  frame.visible = 0;
   for (const LandmarkId id : frame.landmarks) {
-    if (id.is_valid()) is_matched[id.index()] = true;
+    if (!id.is_valid()) continue;
+    is_matched[id.index()] = true;
+    ++frame.visible;
   }
   // Cosine between viewing directions from which the search radius is smaller (as in ORB-SLAM).
   constexpr float kFrontal = 0.998F;
@@ -306,15 +280,20 @@ void Tracker::match_local_landmarks(TrackedFrame& frame) {
                                      predicted->depth, settings_.matcher.max_distance, true},
                                     landmark.descriptor, *frame.view, frame.landmarks);
     if (match >= 0) frame.landmarks[static_cast<std::size_t>(match)] = id;
+    frame.visible += match >= 0 || !is_occluded(*predicted, depth) ? 1 : 0;
   }
 }
 
-bool Tracker::refine_with_local_map(TrackedFrame& frame, KeyframeId near) {
-  const Stopwatch watch;
+void Tracker::refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate, KeyframeId near,
+                                    const cv::Mat& depth) {
+  Stopwatch watch;
+  frame.T_camera_world = candidate.T_camera_world;
+  frame.landmarks = std::move(candidate.landmarks);
   local_map_.update(map_, frame.landmarks, near);
   frame.reference = local_map_.reference();
-  match_local_landmarks(frame);
+  match_local_landmarks(frame, depth);
   times_.match_map += watch.seconds();
+  watch = {};
   std::vector<Eigen::Vector3d> positions;
   std::vector<std::uint32_t> points;
   for (std::uint32_t i = 0; i < frame.landmarks.size(); ++i) {
@@ -323,16 +302,21 @@ bool Tracker::refine_with_local_map(TrackedFrame& frame, KeyframeId near) {
     points.push_back(i);
   }
   if (static_cast<int>(points.size()) < settings_.tracker.scarce_inliers) {
-    for (std::size_t k = 0; k < unmapped_points_.size(); ++k) {
-      if (frame.landmarks[unmapped_points_[k]].is_valid()) continue;
-      frame.landmarks[unmapped_points_[k]] = kUnmapped;
-      positions.push_back(unmapped_positions_[k]);
-      points.push_back(unmapped_points_[k]);
+    for (const TemporaryPoint& temporary : candidate.temporary) {
+      if (frame.landmarks[temporary.point].is_valid()) continue;
+      frame.landmarks[temporary.point] = kTemporary;
+      positions.push_back(temporary.position);
+      points.push_back(temporary.point);
     }
   }
-  const bool good = estimate(frame, positions, points, settings_.tracker.min_inliers);
-  std::replace(frame.landmarks.begin(), frame.landmarks.end(), kUnmapped, LandmarkId{});
-  return good;
+  const OptimisedPose pose =
+      optimise_frame(camera_, map_, *frame.view, points, positions, *frame.T_camera_world, settings_.noise,
+                     settings_.pose, frame.landmarks);
+  std::replace(frame.landmarks.begin(), frame.landmarks.end(), kTemporary, LandmarkId{});
+  frame.T_camera_world = pose.T_camera_world;
+  frame.covariance = pose.covariance;
+  frame.inliers = pose.inliers;
+  times_.optimise += watch.seconds();
 }
 
 // While dynamic objects hide the scene, the pose is extrapolated with the motion model for a limited time.
@@ -348,19 +332,16 @@ bool Tracker::predict_hidden(TrackedFrame& frame, const FrameHint& hint) {
 
 bool Tracker::relocalise(TrackedFrame& frame, const FrameHint& hint) {
   const Stopwatch watch;
-  unmapped_points_.clear();
-  unmapped_positions_.clear();
   const auto similar = hint.similar_keyframes ? hint.similar_keyframes() : std::vector<KeyframeId>{};
   // No prior on the pose: lost for long, or no frame tracked yet in a loaded map.
   const bool search_all = last_.view == nullptr || frames_lost_ >= settings_.tracker.recently_lost_frames;
   const auto found = relocaliser_.find(map_, *frame.view, similar, search_all);
   times_.relocalise += watch.seconds();
   if (!found) return false;
-  frame.T_camera_world = found->T_camera_world;
-  frame.landmarks = found->landmarks;
+  PoseCandidate candidate{found->T_camera_world, found->landmarks, {}, 0};
   // A wrong relocalisation would corrupt the map: the local map must give twice the usual inliers.
-  return refine_with_local_map(frame, found->matched_keyframe) &&
-         frame.inliers >= 2 * settings_.tracker.min_inliers;
+  refine_with_local_map(frame, std::move(candidate), found->matched_keyframe, hint.depth);
+  return is_accepted(frame, 2 * settings_.tracker.min_inliers);
 }
 
 void Tracker::count_found(const TrackedFrame& frame) {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <functional>
+#include <map>
 #include <memory>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -14,43 +17,35 @@
 #include "roslam/geometry/se3.hpp"
 #include "roslam/map/map.hpp"
 #include "roslam/matching/projection_matcher.hpp"
+#include "roslam/tracking/initial_pose.hpp"
 #include "roslam/tracking/local_map.hpp"
+#include "roslam/tracking/pose_check.hpp"
 #include "roslam/tracking/relocaliser.hpp"
+#include "roslam/tracking/tracked_frame.hpp"
 #include "roslam/tracking/tracking_options.hpp"
-#include "roslam/tracking/tracking_state.hpp"
 
 namespace roslam {
 
 /// What is known of a frame before it is tracked.
 struct FrameHint {
-  std::optional<SE3> T_camera_world;  ///< a better initial pose than predicted_pose(), if any
+  std::optional<SE3> T_camera_world;  ///< a prediction beside predicted_pose(), as by optical flow
   double hidden_share = 0.0;          ///< of the image, hidden by dynamic objects
+  cv::Mat depth = {};                 ///< CV_32FC1 metres, 0 = unknown; tells what is occluded; may be empty
   bool may_start = true;  ///< false where movable objects fill the image, on which no map must start
 
   /// Keyframes similar to the frame, best first; called only to relocalise. May be empty.
   std::function<std::vector<KeyframeId>()> similar_keyframes = {};
 };
 
-/// The tracking result of a frame.
-struct TrackedFrame {
-  TrackingState state = TrackingState::kInitialising;
-  double timestamp = 0.0;  ///< seconds
-  std::shared_ptr<const ObservedFrame> view;
-  std::optional<SE3> T_camera_world;  ///< empty unless state is kTracking or kPredicted
-  std::vector<LandmarkId> landmarks;  ///< landmark each point shows, or none; inliers only
-  int inliers = 0;                    ///< landmarks that agree with the pose
-  double quality = 0.0;               ///< 0 (predicted or unknown) to 1 (trusted_inliers or more inliers)
-  int hidden = 0;                     ///< landmarks of the reference that removed objects hide
-  KeyframeId reference;               ///< shares most landmarks; none for the first frame of a submap
-};
-
-/// Estimates the pose of each frame against the map: prediction by the motion model, matching with the last
-/// frame, then with the local map; relocalisation when lost, and a new submap if that fails for long. Of the
+/// Estimates the pose of each frame against the map: initial poses by matches with the last frame around
+/// several predictions and with the reference keyframe, of which the best supported is refined with the local
+/// map; relocalisation when lost, and a new submap if that fails for long. Of the
 /// map it changes only Landmark::times_visible and times_found. Not thread safe; the caller holds the mutex.
 class Tracker {
  public:
   struct Settings {
     TrackerOptions tracker;
+    PlausibilityOptions plausible;
     MatcherOptions matcher;
     PoseOptimiserOptions pose;
     LocalMapOptions local_map;
@@ -82,6 +77,9 @@ class Tracker {
   /// The landmarks of the local map of the last frame; some may have been removed since.
   const std::vector<LandmarkId>& local_landmarks() const { return local_map_.landmarks(); }
 
+  /// How many poses were not taken for the true ones so far, by reason.
+  const std::map<PoseDoubt, std::size_t>& doubts() const { return doubts_; }
+
   /// Seconds the last call spent in each step, for the report.
   struct Times {
     double match_frame = 0.0;
@@ -94,17 +92,17 @@ class Tracker {
  private:
   bool can_start(const TrackedFrame& frame, const FrameHint& hint);
   TrackedFrame initialise(TrackedFrame frame);
-  bool follow(TrackedFrame& frame, const std::optional<SE3>& T_camera_world);
-  bool match_last_frame(TrackedFrame& frame, const SE3& predicted, float radius_factor);
-  bool match_reference(TrackedFrame& frame);
-  bool refine_with_local_map(TrackedFrame& frame, KeyframeId near);
+  bool follow(TrackedFrame& frame, const FrameHint& hint);
+  std::vector<SE3> predictions(double timestamp, const std::optional<SE3>& by_flow) const;
+  bool accept_best(TrackedFrame& frame, std::vector<PoseCandidate> candidates, const FrameHint& hint);
+  void refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate, KeyframeId near,
+                             const cv::Mat& depth);
+  PoseDoubt doubt_of(const TrackedFrame& frame, int min_inliers) const;
+  bool is_accepted(const TrackedFrame& frame, int min_inliers);
   bool predict_hidden(TrackedFrame& frame, const FrameHint& hint);
   bool relocalise(TrackedFrame& frame, const FrameHint& hint);
-  bool estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
-                const std::vector<std::uint32_t>& points, int min_inliers);
-  bool first_estimate(TrackedFrame& frame, const std::vector<Eigen::Vector3d>& positions,
-                      const std::vector<std::uint32_t>& points);
-  void match_local_landmarks(TrackedFrame& frame);
+  void match_local_landmarks(TrackedFrame& frame, const cv::Mat& depth);
+  bool is_occluded(const Prediction& predicted, const cv::Mat& depth) const;
   void count_found(const TrackedFrame& frame);
   SE3 predict_pose(double timestamp) const;
   void remember(const TrackedFrame& frame);
@@ -113,19 +111,18 @@ class Tracker {
   Map& map_;
   Settings settings_;
   ProjectionMatcher matcher_;
+  InitialPoseEstimator initial_pose_;
   LocalMap local_map_;
   Relocaliser relocaliser_;
 
   TrackingState state_ = TrackingState::kInitialising;
-  TrackedFrame last_;                 // the last frame with a pose
-  SE3 T_last_reference_;              // its pose in its reference keyframe, which bundle adjustment may move
-  std::optional<Vector6d> velocity_;  // twist of T_current_last, per second; none: unknown
-  // Points of the current frame matched with points of the last frame that have no landmark.
-  std::vector<std::uint32_t> unmapped_points_;
-  std::vector<Eigen::Vector3d> unmapped_positions_;  // world, metres
+  TrackedFrame last_;                  // the last frame with a pose
+  SE3 T_last_reference_;               // its pose in its reference keyframe, which bundle adjustment may move
+  std::optional<Vector6d> velocity_;   // twist of T_current_last, per second; none: unknown
   std::optional<double> waits_since_;  // seconds; to start a map, for a view that movable objects do not fill
   int frames_lost_ = 0;
   int frames_unrecognised_ = 0;  // of these, frames with enough points to start a submap
+  std::map<PoseDoubt, std::size_t> doubts_;
   Times times_;
 };
 

@@ -24,6 +24,18 @@ struct ROSLAM_EXPORT TrackerOptions {
   void validate() const;
 };
 
+/// What a pose must fulfil beside its inliers to be taken for the true one. The limits of motion are those of
+/// an agile drone; a vehicle that moves less is guarded better by smaller ones.
+struct ROSLAM_EXPORT PlausibilityOptions {
+  double min_found_share = 0.05;   ///< of the landmarks that the pose puts into view unoccluded
+  double max_speed = 20.0;         ///< m/s
+  double max_acceleration = 30.0;  ///< m/s^2, change of velocity between two frames
+  double max_turn_rate = 720.0;    ///< degrees/s
+
+  /// Throws OptionsError naming the field.
+  void validate() const;
+};
+
 struct ROSLAM_EXPORT LocalMapOptions {
   int max_keyframes = 40;  ///< keyframes whose landmarks are searched for
   int neighbours = 5;      ///< covisible keyframes of the reference keyframe that are added

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/tracking/pose_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "roslam/common/error.hpp"
+
+namespace roslam {
+
+void PlausibilityOptions::validate() const {
+  if (!(min_found_share >= 0.0 && min_found_share < 1.0))
+    throw OptionsError("plausible.min_found_share must be 0 to 1");
+  if (!(max_speed > 0.0)) throw OptionsError("plausible.max_speed must be positive (m/s)");
+  if (!(max_acceleration > 0.0)) throw OptionsError("plausible.max_acceleration must be positive (m/s^2)");
+  if (!(max_turn_rate > 0.0)) throw OptionsError("plausible.max_turn_rate must be positive (degrees/s)");
+}
+
+std::string_view describe(PoseDoubt doubt) {
+  switch (doubt) {
+    case PoseDoubt::kNone:
+      return "none";
+    case PoseDoubt::kFewInliers:
+      return "too few landmarks agree";
+    case PoseDoubt::kFewFound:
+      return "too few of the landmarks in view are found";
+    case PoseDoubt::kSpeed:
+      return "the speed is not plausible";
+    case PoseDoubt::kAcceleration:
+      return "the acceleration is not plausible";
+    case PoseDoubt::kTurnRate:
+      return "the turn rate is not plausible";
+  }
+  return "unknown";
+}
+
+PoseDoubt check_motion(const MotionState& last, double timestamp, const SE3& T_world_camera, double sigma,
+                       const PlausibilityOptions& options) {
+  const double elapsed = timestamp - last.timestamp;
+  if (!(elapsed > 0.0)) return PoseDoubt::kNone;
+  constexpr double kLeastSigma = 0.01;  // metres; the covariance does not contain all errors
+  const double noise = 3.0 * std::hypot(std::max(sigma, kLeastSigma), std::max(last.sigma, kLeastSigma));
+  const Eigen::Vector3d moved = T_world_camera.translation() - last.T_world_camera.translation();
+  if (moved.norm() > options.max_speed * elapsed + noise) return PoseDoubt::kSpeed;
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  constexpr double kNoiseOfTurn = 3.0;  // degrees
+  const double turned = (last.T_world_camera.inverse() * T_world_camera).angle() * kDegrees;
+  if (turned > options.max_turn_rate * elapsed + kNoiseOfTurn) return PoseDoubt::kTurnRate;
+  if (!last.velocity) return PoseDoubt::kNone;
+  // The velocity is a difference of poses, too: its noise counts once more.
+  const double off = (moved - *last.velocity * elapsed).norm();
+  if (off > options.max_acceleration * elapsed * elapsed + 2.0 * noise) return PoseDoubt::kAcceleration;
+  return PoseDoubt::kNone;
+}
+
+}  // namespace roslam

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "roslam/features/observed_frame.hpp"
+#include "roslam/geometry/se3.hpp"
+#include "roslam/map/ids.hpp"
+#include "roslam/tracking/tracking_state.hpp"
+
+namespace roslam {
+
+/// The tracking result of a frame.
+struct TrackedFrame {
+  TrackingState state = TrackingState::kInitialising;
+  double timestamp = 0.0;  ///< seconds
+  std::shared_ptr<const ObservedFrame> view;
+  std::optional<SE3> T_camera_world;       ///< empty unless state is kTracking or kPredicted
+  std::vector<LandmarkId> landmarks;       ///< landmark each point shows, or none; inliers only
+  int inliers = 0;                         ///< landmarks that agree with the pose
+  int visible = 0;                         ///< landmarks that the pose puts into view unoccluded
+  Matrix6d covariance = Matrix6d::Zero();  ///< of the pose, as OptimisedPose::covariance
+  double quality = 0.0;  ///< 0 (predicted or unknown) to 1 (trusted_inliers or more inliers)
+  int hidden = 0;        ///< landmarks of the reference that removed objects hide
+  KeyframeId reference;  ///< shares most landmarks; none for the first frame of a submap
+};
+
+}  // namespace roslam
