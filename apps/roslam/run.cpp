@@ -218,6 +218,7 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command->add_flag("--localise-only", arguments->flight.localise_only,
                     "Localise in --map without changing the map");
   add_flight_options(*command, arguments->flight.source);
+  add_degrade_option(*command, arguments->flight.source);
   command->add_flag("--print-config", arguments->print_config, "Print the effective options (YAML) and exit");
   command->add_flag("--video", arguments->flight.video,
                     "Write removal.avi too: each frame with kept and removed points");

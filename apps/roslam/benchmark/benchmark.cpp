@@ -13,6 +13,7 @@ void add_benchmark_command(CLI::App& program, const std::string& version) {
   add_benchmark_dynamic_command(*benchmark, version);
   add_benchmark_restoration_command(*benchmark, version);
   add_benchmark_map_command(*benchmark, version);
+  add_benchmark_robustness_command(*benchmark, version);
 }
 
 }  // namespace roslam::app

@@ -10,6 +10,7 @@ namespace roslam::app {
 void add_benchmark_static_command(CLI::App& benchmark, const std::string& version);
 void add_benchmark_dynamic_command(CLI::App& benchmark, const std::string& version);
 void add_benchmark_restoration_command(CLI::App& benchmark, const std::string& version);
+void add_benchmark_robustness_command(CLI::App& benchmark, const std::string& version);
 void add_benchmark_map_command(CLI::App& benchmark, const std::string& version);
 
 }  // namespace roslam::app

@@ -27,6 +27,7 @@ std::vector<std::string> run_arguments(const BenchmarkSequence& sequence, const 
   };
   arguments.emplace_back(settings.mode == Mode::kRealTime ? "--real-time" : "--deterministic");
   if (!settings.config.empty()) add("--config", settings.config);
+  if (settings.degrade != "none") add("--degrade", settings.degrade);
   if (!sequence.is_simulated()) {
     add("--camera", sequence.camera);
     return arguments;

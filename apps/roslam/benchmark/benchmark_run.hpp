@@ -23,6 +23,7 @@ struct BenchmarkSettings {
   std::string traffic = "none";  ///< of simulated flights
   std::size_t frames = 300;      ///< of simulated flights; 0 = all
   std::uint32_t seed = 1;        ///< of simulated flights
+  std::string degrade = "none";  ///< of the images: a name of simulation::degradation_names()
 };
 
 /// Results of one run of a sequence. Unknown numbers are NaN.

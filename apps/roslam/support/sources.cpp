@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "roslam/common/error.hpp"
+#include "simulation/degraded_source.hpp"
 #include "simulation/simulated_source.hpp"
 
 namespace roslam::app {
@@ -39,6 +40,16 @@ CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
       "--camera", arguments.camera,
       "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file");
   return source;
+}
+
+void add_degrade_option(CLI::App& command, SourceArguments& arguments) {
+  command
+      .add_option(
+          "--degrade", arguments.degrade,
+          "Make the images worse, to test robustness: take each 2nd to 5th only, blur a third, step the "
+          "exposure, leave out bursts of 0.2 to 1 s")
+      ->check(CLI::IsMember(degradation_names()))
+      ->capture_default_str();
 }
 
 void add_flight_options(CLI::App& command, SourceArguments& arguments) {
@@ -126,8 +137,14 @@ std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments) {
 }
 
 std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
-  if (const auto flight = simulated_flight(arguments)) return std::make_unique<SimulatedSource>(*flight);
-  return open_recording(arguments);
+  std::unique_ptr<FrameSource> source;
+  if (const auto flight = simulated_flight(arguments))
+    source = std::make_unique<SimulatedSource>(*flight);
+  else
+    source = open_recording(arguments);
+  const auto degradation = degradation_from(arguments.degrade).value_or(Degradation::kNone);
+  if (degradation == Degradation::kNone) return source;
+  return std::make_unique<DegradedSource>(std::move(source), degradation);
 }
 
 }  // namespace roslam::app

@@ -21,10 +21,11 @@ struct SourceArguments {
   std::string traffic = "light";  ///< the rest: of a simulated flight; none, light, heavy
   std::size_t frames = 0;         ///< 0 = the whole flight
   std::uint32_t seed = 1;
-  double speed = 1.0;     ///< m/s
-  double altitude = 3.5;  ///< metres above the street
-  double aside = 0.0;     ///< metres to the left of the default path
-  double gain = 1.0;      ///< factor of the image brightness
+  double speed = 1.0;            ///< m/s
+  double altitude = 3.5;         ///< metres above the street
+  double aside = 0.0;            ///< metres to the left of the default path
+  double gain = 1.0;             ///< factor of the image brightness
+  std::string degrade = "none";  ///< a name of simulation::degradation_names(), of any source
 };
 
 /// Adds SOURCE and --camera to a command; returns the option SOURCE.
@@ -32,6 +33,9 @@ CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments);
 
 /// Adds the options of simulated flights: --traffic, --frames, --seed and so on.
 void add_flight_options(CLI::App& command, SourceArguments& arguments);
+
+/// Adds --degrade.
+void add_degrade_option(CLI::App& command, SourceArguments& arguments);
 
 /// Opens the source. Throws InputError or CalibrationError.
 std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments);
