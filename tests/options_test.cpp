@@ -91,8 +91,9 @@ std::map<std::string, std::size_t> fields_by_section() {
   // A section that is added to Options must be added here, too: it does not compile otherwise.
   const Options options;
   const auto& [orb, depth, noise, segmenter, dynamic_objects, matcher, pose, local_map, relocaliser, tracker,
-               keyframes, landmarks, fusion, culling, bundle, loop, geometric_verifier, loop_closer,
-               pose_graph, restoration, reprojection, inpainting, depth_completion, dense, threads] = options;
+               plausible, keyframes, landmarks, fusion, culling, bundle, loop, geometric_verifier,
+               loop_closer, pose_graph, restoration, reprojection, inpainting, depth_completion, dense,
+               threads] = options;
   const auto count = [](const auto& section) { return field_count<std::decay_t<decltype(section)>>(); };
   return {{"orb", count(orb)},
           {"depth", count(depth)},
@@ -104,6 +105,7 @@ std::map<std::string, std::size_t> fields_by_section() {
           {"local_map", count(local_map)},
           {"relocaliser", count(relocaliser)},
           {"tracker", count(tracker)},
+          {"plausible", count(plausible)},
           {"keyframes", count(keyframes)},
           {"landmarks", count(landmarks)},
           {"fusion", count(fusion)},
