@@ -5,35 +5,28 @@
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <utility>
 
 namespace roslam::simulation {
 
 namespace {
-constexpr std::array<std::pair<std::string_view, Degradation>, 8> kNames{
-    {{"none", Degradation::kNone},
-     {"every-2", Degradation::kEvery2},
-     {"every-3", Degradation::kEvery3},
-     {"every-4", Degradation::kEvery4},
-     {"every-5", Degradation::kEvery5},
-     {"blur", Degradation::kBlur},
-     {"exposure", Degradation::kExposure},
-     {"bursts", Degradation::kBursts}}};
+struct Kind {
+  std::string_view name;
+  Degradation degradation;
+  std::size_t interval;  // of so many images, one is kept
+};
 
-// Of the images, one is kept.
-std::size_t interval_of(Degradation degradation) {
-  switch (degradation) {
-    case Degradation::kEvery2:
-      return 2;
-    case Degradation::kEvery3:
-      return 3;
-    case Degradation::kEvery4:
-      return 4;
-    case Degradation::kEvery5:
-      return 5;
-    default:
-      return 1;
-  }
+constexpr std::array<Kind, 8> kKinds{{{"none", Degradation::kNone, 1},
+                                      {"every-2", Degradation::kEvery2, 2},
+                                      {"every-3", Degradation::kEvery3, 3},
+                                      {"every-4", Degradation::kEvery4, 4},
+                                      {"every-5", Degradation::kEvery5, 5},
+                                      {"blur", Degradation::kBlur, 1},
+                                      {"exposure", Degradation::kExposure, 1},
+                                      {"bursts", Degradation::kBursts, 1}}};
+
+const Kind& kind_of(Degradation degradation) {
+  return *std::find_if(kKinds.begin(), kKinds.end(),
+                       [&](const Kind& kind) { return kind.degradation == degradation; });
 }
 
 // Along a line whose direction changes from one blurred stretch to the next.
@@ -61,23 +54,18 @@ cv::Mat exposed(const cv::Mat& image, std::size_t index) {
 }
 }  // namespace
 
-std::string_view name_of(Degradation degradation) {
-  for (const auto& [name, value] : kNames) {
-    if (value == degradation) return name;
-  }
-  return "none";
-}
+std::string_view name_of(Degradation degradation) { return kind_of(degradation).name; }
 
 std::optional<Degradation> degradation_from(std::string_view name) {
-  for (const auto& [known, value] : kNames) {
-    if (known == name) return value;
+  for (const Kind& kind : kKinds) {
+    if (kind.name == name) return kind.degradation;
   }
   return std::nullopt;
 }
 
 std::vector<std::string> degradation_names() {
   std::vector<std::string> names;
-  for (const auto& [name, value] : kNames) names.emplace_back(name);
+  for (const Kind& kind : kKinds) names.emplace_back(kind.name);
   return names;
 }
 
@@ -85,12 +73,12 @@ std::optional<std::size_t> DegradedSource::size() const {
   const auto all = source_->size();
   if (!all || degradation_ == Degradation::kBursts)
     return std::nullopt;  // unknown before the images are read
-  const std::size_t interval = interval_of(degradation_);
+  const std::size_t interval = kind_of(degradation_).interval;
   return (*all + interval - 1) / interval;
 }
 
 bool DegradedSource::is_missing(const Frame& frame) {
-  if (frame.index % interval_of(degradation_) != 0) return true;
+  if (frame.index % kind_of(degradation_).interval != 0) return true;
   if (degradation_ != Degradation::kBursts) return false;
   constexpr double kEvery = 3.0;  // seconds
   constexpr std::array<double, 3> kLengths{0.2, 0.5, 1.0};

@@ -161,9 +161,9 @@ TrackedPoints FlowConsistency::follow(const PastFrame& past, PastFrame& current)
     const auto& [from, to] = moving[i];
     const cv::Point2f motion = to->pixel - expected(past, current, from->pixel, from->undistorted);
     if (errors_back[i] <= std::max(kMaxReturn, kMaxReturnShare * std::hypot(motion.x, motion.y)))
-      result.moving.push_back(moving[i].to->pixel);
+      result.moving.push_back(to->pixel);
     else
-      lost.push_back(moving[i].to->track);
+      lost.push_back(to->track);
   }
   std::sort(lost.begin(), lost.end());
   std::erase_if(current.corners, [&](const Corner& corner) {

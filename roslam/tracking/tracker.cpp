@@ -12,9 +12,6 @@
 namespace roslam {
 
 namespace {
-// Marks points of the frame that match a temporary point.
-constexpr LandmarkId kTemporary{LandmarkId::kNone - 1};
-
 // Standard deviation of the position along its least certain direction, metres.
 double position_sigma(const Matrix6d& covariance) {
   const Eigen::Matrix3d position = covariance.topLeftCorner<3, 3>();
@@ -304,7 +301,6 @@ void Tracker::refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate
   if (static_cast<int>(points.size()) < settings_.tracker.scarce_inliers) {
     for (const TemporaryPoint& temporary : candidate.temporary) {
       if (frame.landmarks[temporary.point].is_valid()) continue;
-      frame.landmarks[temporary.point] = kTemporary;
       positions.push_back(temporary.position);
       points.push_back(temporary.point);
     }
@@ -312,7 +308,6 @@ void Tracker::refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate
   const OptimisedPose pose =
       optimise_frame(camera_, map_, *frame.view, points, positions, *frame.T_camera_world, settings_.noise,
                      settings_.pose, frame.landmarks);
-  std::replace(frame.landmarks.begin(), frame.landmarks.end(), kTemporary, LandmarkId{});
   frame.T_camera_world = pose.T_camera_world;
   frame.covariance = pose.covariance;
   frame.inliers = pose.inliers;

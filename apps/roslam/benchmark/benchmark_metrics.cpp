@@ -56,7 +56,7 @@ std::vector<Metric> benchmark_metrics() {
   return {
       {"frames", "frames", 0, [](const auto& r) { return r.frames; }},
       {"tracked_share", "tracked %", 1, tracked_share_of},
-      {"wrong_frames", "wrong", 0,
+      {"wrong_frames", "wrong frames", 0,
        error([](const TrajectoryError& e) { return static_cast<double>(e.wrong_frames.size()); })},
       {"dropped", "dropped", 0, [](const auto& r) { return r.dropped; }},
       {"ate_rmse_m", "ATE RMSE m", 4, ate_of},

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <set>
+#include <stop_token>
+#include <utility>
 
 #include "apps/roslam/benchmark/benchmark.hpp"
 #include "apps/roslam/benchmark/benchmark_metrics.hpp"
@@ -69,33 +70,27 @@ struct RobustnessReport {
   std::vector<SequenceInMode> sequences;
 };
 
-double wrong_frames_of(const BenchmarkRun& run) {
-  return run.error ? static_cast<double>(run.error->wrong_frames.size()) : std::nan("");
-}
-
 std::string table_of(const SequenceInMode& sequence) {
-  std::vector<TableRow> rows{
-      {"condition", "frames", "tracked %", "wrong frames", "ATE RMSE m", "RPE frame m"}};
+  const std::set<std::string> shown{"frames", "tracked_share", "wrong_frames", "ate_rmse_m",
+                                    "rpe_frame_rmse_m"};
+  auto metrics = benchmark_metrics();
+  std::erase_if(metrics, [&](const Metric& metric) { return shown.count(metric.key) == 0; });
+  std::vector<TableRow> rows{{"condition"}};
+  for (const Metric& metric : metrics) rows.front().push_back(metric.title);
   for (const auto& [condition, result] : sequence.conditions) {
-    const auto median = [&result](const auto& value) { return median_of(result, value); };
-    rows.push_back({condition, fixed(median([](const BenchmarkRun& r) { return r.frames; }), 0),
-                    fixed(100.0 * median(tracked_share_of), 1), fixed(median(wrong_frames_of), 0),
-                    fixed(median(ate_of), 4),
-                    fixed(median([](const BenchmarkRun& r) {
-                            return r.error ? r.error->rpe_frame.translation.rmse : std::nan("");
-                          }),
-                          4)});
+    rows.push_back({condition});
+    for (const Metric& metric : metrics) rows.back().push_back(metric.cell(median_of(result, metric.of)));
   }
   return markdown_table(rows);
 }
 
 std::string markdown(const RobustnessReport& report) {
-  std::string text = "# Robustness\n\n";
-  text +=
-      "Conditions: as taken (none), each 2nd to 5th image, motion blur in a third of the images, steps of "
-      "the "
-      "exposure, bursts without images, half the features. A frame is wrong if it is tracked, but its motion "
-      "since the tracked frame before is off by more than 0.08 m or 4 degrees.\n";
+  std::string text = R"(# Robustness
+
+Conditions: as taken (none), each 2nd to 5th image, motion blur in a third of the images, steps of the exposure,
+bursts without images, half the features. A frame is wrong if it is tracked, but its motion since the tracked frame
+before is off by more than 0.08 m or 4 degrees.
+)";
   for (const auto& sequence : report.sequences) {
     text += "\n## " + table_cell(sequence.sequence) + ", --dynamic " + sequence.mode + "\n\n";
     text += table_of(sequence);
@@ -121,22 +116,43 @@ void write_report(const RobustnessReport& report, const fs::path& out) {
   write_file(out / "benchmark.json", json_text(report));
 }
 
-// The settings of a run under a condition; half the features need an options file of their own.
-BenchmarkSettings settings_for(const std::string& condition, const RobustnessArguments& arguments,
-                               const std::string& mode) {
-  BenchmarkSettings settings = arguments.common.settings;
-  settings.dynamic = mode;
-  if (condition != kHalfFeatures) {
-    settings.degrade = condition;
-    return settings;
+// Each condition with the settings of its runs; half the features need an options file of their own.
+std::vector<std::pair<std::string, BenchmarkSettings>> conditions_of(const RobustnessArguments& arguments) {
+  std::vector<std::pair<std::string, BenchmarkSettings>> conditions;
+  for (const std::string& condition : arguments.conditions) {
+    BenchmarkSettings settings = arguments.common.settings;
+    if (condition == kHalfFeatures) {
+      Options options = settings.config.empty() ? Options{} : read_options(settings.config);
+      options.orb.features /= 2;
+      const fs::path file = fs::path(arguments.common.out) / "runs" / "half-features.yaml";
+      make_folder(file.parent_path());
+      write_file(file, options_to_yaml(options));
+      settings.config = file.string();
+    } else {
+      settings.degrade = condition;
+    }
+    conditions.emplace_back(condition, settings);
   }
-  Options options = settings.config.empty() ? Options{} : read_options(settings.config);
-  options.orb.features /= 2;
-  const fs::path file = fs::path(arguments.common.out) / "runs" / "half-features.yaml";
-  make_folder(file.parent_path());
-  write_file(file, options_to_yaml(options));
-  settings.config = file.string();
-  return settings;
+  return conditions;
+}
+
+void measure_all(const RobustnessArguments& arguments, const std::stop_token& stop,
+                 RobustnessReport& report) {
+  const auto conditions = conditions_of(arguments);
+  for (const auto& sequence : find_sequences(arguments.common.sequences, arguments.common.camera)) {
+    for (const std::string& mode : arguments.modes) {
+      report.sequences.push_back({sequence.name, mode, {}});
+      for (auto [condition, settings] : conditions) {
+        settings.dynamic = mode;
+        const std::string name = sequence.name + "-" + mode + "-" + condition;
+        report.sequences.back().conditions.push_back(
+            {condition, measure(sequence, settings, name, arguments.common, stop)});
+        report.header.is_interrupted = stop.stop_requested();
+        write_report(report, arguments.common.out);
+        if (stop.stop_requested()) return;
+      }
+    }
+  }
 }
 
 void execute(const RobustnessArguments& arguments, const std::string& version) {
@@ -145,20 +161,7 @@ void execute(const RobustnessArguments& arguments, const std::string& version) {
   const auto folder = benchmark_folder(arguments.common);
   if (!arguments.common.settings.config.empty()) read_options(arguments.common.settings.config);
   RobustnessReport report{header_of(arguments.common, version), {}};
-  for (const auto& sequence : find_sequences(arguments.common.sequences, arguments.common.camera)) {
-    for (const std::string& mode : arguments.modes) {
-      report.sequences.push_back({sequence.name, mode, {}});
-      for (const std::string& condition : arguments.conditions) {
-        if (interrupt.token().stop_requested()) break;
-        const std::string name = sequence.name + "-" + mode + "-" + condition;
-        report.sequences.back().conditions.push_back(
-            {condition, measure(sequence, settings_for(condition, arguments, mode), name, arguments.common,
-                                interrupt.token())});
-        report.header.is_interrupted = interrupt.token().stop_requested();
-        write_report(report, out);
-      }
-    }
-  }
+  measure_all(arguments, interrupt.token(), report);
   std::cout << (arguments.common.json ? json_text(report) : markdown(report));
   if (!arguments.common.json) std::cout << "\nresults: " << (out / "benchmark.md").string() << "\n";
   require_written_output();
