@@ -7,6 +7,7 @@ set(ROSLAM_PUBLIC_HEADERS
   common/stage_times.hpp
   geometry/alignment.hpp
   geometry/camera.hpp
+  geometry/depth_noise.hpp
   geometry/se3.hpp
   geometry/trajectory.hpp
   sensors/frame_source.hpp

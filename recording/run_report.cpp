@@ -56,6 +56,13 @@ Json counts_json(const std::map<std::string, std::size_t>& counts) {
 }
 
 // in_source = processed + dropped + all skipped, unless the run ended early.
+Json noise_json(const MeasurementNoise& noise) {
+  return {{"estimated", noise.estimate},
+          {"pixel_sigma", rounded(noise.pixel_sigma, 2)},
+          {"depth_constant_m", rounded(noise.depth_sigma, 5)},
+          {"depth_growth_per_m", rounded(noise.depth_sigma_growth, 5)}};
+}
+
 Json frames_json(const Slam& slam, const RunResults& summary, const FrameSource& source) {
   std::size_t tracked = 0;
   Json by_state = Json::object();
@@ -234,6 +241,7 @@ std::string run_report(const Slam& slam, const RunResults& summary, const FrameS
   json["frames"] = frames_json(slam, summary, source);
   json["gave_way"] = counts_json(slam.gave_way());
   json["warnings"] = counts_json(slam.warnings());
+  json["noise"] = noise_json(slam.measurement_noise());
   json["dynamic"] = dynamic_json(slam, summary, description);
   if (slam.restores())
     json["restoration"] = {{"dropped", slam.unrestored()},

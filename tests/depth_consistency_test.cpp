@@ -12,8 +12,14 @@ constexpr Panel kBox{-0.3, -0.4, 0.3, 0.4, 2.0};
 
 class FreeSpace : public testing::Test {
  protected:
-  cv::Mat cells(const std::vector<Panel>& panels, const SE3& pose = {}) const {
-    return grid_.depth_cells(stage_.show(panels, pose).depth, depth_options_);
+  CellImages cells(const std::vector<Panel>& panels, const SE3& pose = {}) const {
+    return {grid_.depth_cells(stage_.show(panels, pose).depth, depth_options_), {}};
+  }
+
+  // With what they look like.
+  CellImages seen(const std::vector<Panel>& panels, const SE3& pose = {}) const {
+    const auto shot = stage_.show(panels, pose);
+    return {grid_.depth_cells(shot.depth, depth_options_), grid_.grey_cells(shot.grey)};
   }
 
   // Cells of a panel, off its border.
@@ -24,8 +30,8 @@ class FreeSpace : public testing::Test {
 
   // A second and a half of the same view.
   void watch(const std::vector<Panel>& panels, const SE3& pose = {}) {
-    const cv::Mat depth = cells(panels, pose);
-    for (double t = 0.0; t < 1.6; t += 0.25) history_.add(depth, pose, t);
+    const CellImages images = cells(panels, pose);
+    for (double t = 0.0; t < 1.6; t += 0.25) history_.add(images, pose, t);
   }
 
   DepthEvidence examine(const std::vector<Panel>& panels, const SE3& pose = {}, double time = 1.75) const {
@@ -45,7 +51,7 @@ class FreeSpace : public testing::Test {
     cv::RNG random(seed);
     cv::Mat result = depth.clone();
     for (auto& z : cv::Mat_<float>(result)) {
-      z += static_cast<float>(random.gaussian(noise_.sigma_of_depth(static_cast<double>(z))));
+      z += static_cast<float>(random.gaussian(noise_.sigma(static_cast<double>(z))));
     }
     return result;
   }
@@ -53,7 +59,7 @@ class FreeSpace : public testing::Test {
   const Stage stage_;
   const CellGrid grid_{stage_.camera()};
   const DepthOptions depth_options_;
-  const MeasurementNoise noise_;
+  const DepthNoise noise_;
   DynamicObjectOptions options_;
   DepthConsistency history_{options_, noise_};
 };
@@ -132,14 +138,14 @@ TEST_F(FreeSpace, NoiseOfDepthIsNoMotionAndHidesNone) {
   const cv::Mat wall = stage_.show({kWall}).depth;
   std::uint64_t seed = 1;
   for (double t = 0.0; t < 1.6; t += 0.25) {
-    history_.add(grid_.depth_cells(noisy(wall, seed++), depth_options_), {}, t);
+    history_.add({grid_.depth_cells(noisy(wall, seed++), depth_options_), {}}, {}, t);
   }
   const std::vector<Panel> panels{kWall, kBox};
-  const cv::Mat now = grid_.depth_cells(noisy(stage_.show(panels).depth, seed), depth_options_);
+  const CellImages now{grid_.depth_cells(noisy(stage_.show(panels).depth, seed), depth_options_), {}};
   const auto evidence = history_.examine(grid_, now, {}, 1.75);
   EXPECT_EQ(share_of(evidence, MotionEvidence::kMoving, cells_of(panels, 1)), 0.0);
   // Where noise makes depth jump it counts as unknown.
-  EXPECT_GT(share_of(evidence, MotionEvidence::kMoving, cells_of(panels, 2) & (now > 0.0F)), 0.95);
+  EXPECT_GT(share_of(evidence, MotionEvidence::kMoving, cells_of(panels, 2) & (now.depth > 0.0F)), 0.95);
 }
 
 TEST_F(FreeSpace, AChangeWithinToleranceIsNone) {
@@ -154,11 +160,12 @@ TEST_F(FreeSpace, AChangeWithinToleranceIsNone) {
 
 TEST_F(FreeSpace, ASpeckIsNotBelieved) {
   watch({kWall});
-  cv::Mat depth = cells({kWall});
+  CellImages images = cells({kWall});
+  cv::Mat& depth = images.depth;
   depth(cv::Rect(40, 40, 2, 2)).setTo(1.0F);
-  EXPECT_EQ(count_of(history_.examine(grid_, depth, {}, 1.75), MotionEvidence::kMoving), 0);
+  EXPECT_EQ(count_of(history_.examine(grid_, images, {}, 1.75), MotionEvidence::kMoving), 0);
   depth(cv::Rect(40, 40, 5, 5)).setTo(1.0F);
-  EXPECT_GT(count_of(history_.examine(grid_, depth, {}, 1.75), MotionEvidence::kMoving), 15);
+  EXPECT_GT(count_of(history_.examine(grid_, images, {}, 1.75), MotionEvidence::kMoving), 15);
 }
 
 TEST_F(FreeSpace, OneViewOfManyIsNotBelieved) {
@@ -185,7 +192,7 @@ TEST_F(FreeSpace, WhatMovesIsFoundCellByCell) {
   for (const double width : {0.06, 0.1, 0.2}) {
     for (const double x : {-0.4, -0.385, -0.37, 0.1}) {
       const std::vector<Panel> panels{kWall, {x, -0.4, x + width, 0.4, 2.0}};
-      const cv::Mat shown = grid_.mask_cells(stage_.show(panels).shows(2)) & (cells(panels) > 0.0F);
+      const cv::Mat shown = grid_.mask_cells(stage_.show(panels).shows(2)) & (cells(panels).depth > 0.0F);
       const auto evidence = examine(panels);
       const cv::Mat moving = evidence.state == static_cast<int>(MotionEvidence::kMoving);
       EXPECT_EQ(cv::countNonZero(moving & ~shown), 0) << width << ' ' << x;
@@ -226,6 +233,61 @@ TEST(Cells, BoxesOfNumbersEncloseThem) {
     EXPECT_TRUE(boxes[2].empty());
     EXPECT_EQ(boxes[3], cv::Rect(20, 10, 20, 20));
   }
+}
+
+// Depth that is wrong in a patch, as stereo cameras measure it on surfaces without texture.
+class AppearanceOfTheBackground : public FreeSpace {
+ protected:
+  static constexpr double kTime = 1.75;   // seconds
+  const cv::Rect patch_{60, 40, 20, 30};  // cells
+
+  void watch_closely() {
+    for (double t = 0.0; t < 1.6; t += 0.25) history_.add(seen({kWall}), {}, t);
+  }
+
+  int moving_in_patch(const CellImages& now, const SE3& pose = {}) const {
+    const auto evidence = history_.examine(grid_, now, pose, kTime);
+    return cv::countNonZero(evidence.state(patch_) == static_cast<int>(MotionEvidence::kMoving));
+  }
+};
+
+TEST_F(AppearanceOfTheBackground, ContradictsWrongDepth) {
+  watch_closely();
+  const SE3 pose = looking_from(0.1, 0.0, 0.0);
+  CellImages now = seen({kWall}, pose);
+  now.depth(patch_).setTo(2.0);
+  EXPECT_LT(moving_in_patch(now, pose), patch_.area() / 100);
+  now.grey.release();
+  EXPECT_GT(moving_in_patch(now, pose), patch_.area() / 2) << "without the image it seems to move";
+}
+
+TEST_F(AppearanceOfTheBackground, AlsoWhenTheExposureChanged) {
+  watch_closely();
+  CellImages now = seen({kWall});
+  now.depth(patch_).setTo(2.0);
+  now.grey = 0.6 * now.grey;
+  EXPECT_LT(moving_in_patch(now), patch_.area() / 100);
+}
+
+TEST_F(AppearanceOfTheBackground, IsHiddenByWhatStepsBeforeIt) {
+  watch_closely();
+  const std::vector<Panel> now{kWall, kBox};
+  CellImages images = seen(now);
+  const cv::Mat box = cells_of(now, 2);
+  cv::add(images.grey, 40, images.grey, grid_.mask_cells(stage_.show(now).shows(2)));  // textures are alike
+  const auto evidence = history_.examine(grid_, images, {}, kTime);
+  EXPECT_GT(share_of(evidence, MotionEvidence::kMoving, box), 0.7);
+  EXPECT_EQ(share_of(evidence, MotionEvidence::kMoving, cells_of(now, 1)), 0.0);
+}
+
+TEST_F(AppearanceOfTheBackground, IsNotComparedBeyondWhatWasSeen) {
+  watch_closely();
+  const SE3 pose = turned(0.5);
+  CellImages now = seen({kWall}, pose);
+  const cv::Rect right(grid_.size().width - 20, 40, 20, 30);  // never seen before
+  now.depth(right).setTo(2.0);
+  const auto evidence = history_.examine(grid_, now, pose, kTime);
+  EXPECT_EQ(cv::countNonZero(evidence.state(right) == static_cast<int>(MotionEvidence::kMoving)), 0);
 }
 
 }  // namespace

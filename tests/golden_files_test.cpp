@@ -253,6 +253,33 @@ TEST_F(GoldenFiles, TheMapHasItsKeyframes) {
   }
 }
 
+TEST_F(GoldenFiles, AMapWithNoiseIsWrittenInVersionTwoAndReadAgain) {
+  SavedMap saved = known_saved_map();
+  saved.camera.depth_noise = DepthNoise{0.0625, 0.03125};
+  ObservedFrame view = *saved.map.find(KeyframeId{1})->view;
+  view.pixel_sigma = 0.75;
+  view.depth_noise = DepthNoise{0.25, 0.5};
+  saved.map.find(KeyframeId{1})->view = std::make_shared<const ObservedFrame>(view);
+  save_map(written_, saved);
+  const std::string bytes = bytes_of(written_);
+  BinaryReader reader(bytes, "map");
+  reader.get_bytes(8);
+  EXPECT_EQ(reader.get<std::uint32_t>(), 2U);
+  EXPECT_EQ(bytes.size(), kMapBytes + (2 + 4 * 3) * sizeof(double));
+  const SavedMap again = load_map(written_);
+  EXPECT_EQ(again.camera, saved.camera);
+  EXPECT_EQ(again.map.find(KeyframeId{1})->view->pixel_sigma, 0.75);
+  EXPECT_EQ(again.map.find(KeyframeId{1})->view->depth_noise, (DepthNoise{0.25, 0.5}));
+  EXPECT_FALSE(again.map.find(KeyframeId{0})->view->pixel_sigma);
+  EXPECT_FALSE(again.map.find(KeyframeId{0})->view->depth_noise);
+  constexpr std::size_t kNoise = (2 + 4 * 3) * sizeof(double);
+  const auto shorter = [&](std::size_t lost) {
+    return decode_map(bytes.substr(kHeaderBytes, bytes.size() - kHeaderBytes - lost), "map");
+  };
+  for (std::size_t lost = 1; lost < kNoise; ++lost) EXPECT_ANY_THROW(shorter(lost)) << lost;
+  EXPECT_FALSE(shorter(kNoise).camera.depth_noise);
+}
+
 TEST_F(GoldenFiles, TheMapHasItsLandmarksAndLoops) {
   const SavedMap saved = load_map(kMapFile);
   const Map known = known_map();

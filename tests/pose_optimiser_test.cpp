@@ -203,6 +203,22 @@ TEST_F(OptimisePose, TheCovarianceIsThatOfTheError) {
   }
 }
 
+TEST_F(OptimisePose, TellsHowLargeThePixelErrorsAre) {
+  for (const double pixels : {0.5, 1.5, 3.0}) {
+    std::normal_distribution<double> normal(0.0, pixels);
+    Measurements noisy;
+    for (int i = 0; i < 400; ++i) {
+      const bool is_wrong = i % 5 == 0;
+      const double off = is_wrong ? 30.0 : 0.0;
+      noisy.push_back(measure(random_point(1.5, 5.0), true, {off + normal(random_), normal(random_)}));
+    }
+    const OptimisedPose pose = optimise_pose(camera_, noisy, truth_);
+    // A fifth of outliers raises the median by a tenth or so.
+    EXPECT_NEAR(pose.pixel_error_scale * noise_.pixel_sigma, 1.15 * pixels, 0.15 * pixels);
+  }
+  EXPECT_EQ(optimise_pose(camera_, {}, truth_).pixel_error_scale, 0.0);
+}
+
 TEST_F(OptimisePose, DerivativesByThePoseAgreeWithNumericOnes) {
   const auto [point_world, measurement] = measure({0.4, -0.3, 2.2}, true, {3.0, -2.0});
   const ReprojectionError term{camera_, measurement};

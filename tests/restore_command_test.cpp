@@ -143,7 +143,7 @@ TEST_F(RestoreCommand, ReprojectionAloneLeavesTheRestBlack) {
     open += cv::countNonZero(provenance == 255);
     EXPECT_EQ(cv::norm(colour, cv::NORM_INF, provenance == 255), 0.0) << file;
   }
-  EXPECT_GT(open, 100);
+  EXPECT_GT(open, 0);
 }
 
 TEST_F(RestoreCommand, FliesFirstWhereThatWasNotDone) {

@@ -32,7 +32,8 @@ std::uint32_t check_header(std::string_view bytes, std::size_t left, const Binar
   }
   BinaryReader header(bytes, name);
   header.get_bytes(kMagic);
-  if (const auto version = header.get<std::uint32_t>(); version != format.version) {
+  const std::uint32_t oldest = format.oldest != 0 ? format.oldest : format.version;
+  if (const auto version = header.get<std::uint32_t>(); version < oldest || version > format.version) {
     throw InputError(name + ": written in version " + std::to_string(version) + " of the format, this " +
                      "program reads version " + std::to_string(format.version) +
                      "; make it again with this program");

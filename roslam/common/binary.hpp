@@ -77,9 +77,10 @@ class BinaryReader {
 /// Type and version of a file, its first 12 bytes, and its size limit.
 struct BinaryFormat {
   std::string_view magic;        ///< 8 characters
-  std::uint32_t version = 1;     ///< readers accept this one only
+  std::uint32_t version = 1;     ///< that is written
   std::string_view what;         ///< in words, "a vocabulary", for messages
   std::uintmax_t max_bytes = 0;  ///< larger files are refused unread
+  std::uint32_t oldest = 0;      ///< version that is read; 0: only version
 };
 
 /// Writes magic, version, length of the content, its CRC-32 and the content. Atomic, by replace_file. Throws

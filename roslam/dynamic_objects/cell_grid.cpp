@@ -85,6 +85,18 @@ cv::Point CellGrid::cell_of(const cv::Point2f& pixel) const {
           std::clamp(static_cast<int>(pixel.y) / side_, 0, size_.height - 1)};
 }
 
+cv::Mat CellGrid::grey_cells(const cv::Mat& grey) const {
+  cv::Mat whole = grey;
+  const cv::Size covered = size_ * side_;
+  if (covered != grey.size()) {
+    cv::copyMakeBorder(grey, whole, 0, covered.height - grey.rows, 0, covered.width - grey.cols,
+                       cv::BORDER_REPLICATE);
+  }
+  cv::Mat cells;
+  cv::resize(whole, cells, size_, 0.0, 0.0, cv::INTER_AREA);
+  return cells;
+}
+
 cv::Mat CellGrid::depth_cells(const cv::Mat& depth, const DepthOptions& options) const {
   cv::Mat cells = cv::Mat::zeros(size_, CV_32FC1);
   if (depth.empty()) return cells;

@@ -53,6 +53,9 @@ class CellGrid {
   /// CV_32FC1, metres: depth at the centre of each cell; 0 where unknown or at a depth discontinuity.
   cv::Mat depth_cells(const cv::Mat& depth, const DepthOptions& options) const;
 
+  /// CV_8UC1: mean of each cell of a grey image (CV_8UC1).
+  cv::Mat grey_cells(const cv::Mat& grey) const;
+
   /// CV_8UC1: 255 for each cell whose centre is set in a mask of the image, or of a rectangle of cells.
   cv::Mat mask_cells(const cv::Mat& mask) const { return mask_cells(mask, cv::Rect({0, 0}, size_)); }
   cv::Mat mask_cells(const cv::Mat& mask, const cv::Rect& area) const;

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
+
+#include "roslam/common/upper_median.hpp"
 
 namespace roslam {
 
@@ -51,6 +54,39 @@ cv::Mat with_support(const cv::Mat& votes, int needed, int cells) {
   return result;
 }
 
+// The least mean difference between the cells around one of an image and those around one of another, over
+// shifts by one cell, which allow for errors of the pose; grey levels. gain: of a against b. Cells outside an
+// image do not count.
+float difference_around(const cv::Mat& a, const cv::Point& in_a, const cv::Mat& b, const cv::Point& in_b,
+                        float gain) {
+  const cv::Rect whole({0, 0}, a.size());
+  const cv::Rect around(in_a.x - 1, in_a.y - 1, 3, 3);
+  float least = std::numeric_limits<float>::infinity();
+  for (int y = -1; y <= 1; ++y) {
+    for (int x = -1; x <= 1; ++x) {
+      const cv::Point shift = in_b - in_a + cv::Point(x, y);
+      const cv::Rect common = around & whole & (whole - shift);
+      if (common.empty()) continue;
+      float sum = 0.0F;
+      for (int v = common.y; v < common.y + common.height; ++v) {
+        const auto* row_a = a.ptr<std::uint8_t>(v);
+        const auto* row_b = b.ptr<std::uint8_t>(v + shift.y) + shift.x;
+        for (int u = common.x; u < common.x + common.width; ++u)
+          sum += std::abs(static_cast<float>(row_a[u]) - gain * static_cast<float>(row_b[u]));
+      }
+      least = std::min(least, sum / static_cast<float>(common.area()));
+    }
+  }
+  return least;
+}
+
+// Standard deviation of the cells around one, grey levels.
+float contrast_around(const cv::Mat& image, const cv::Point& at) {
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(image(cv::Rect(at.x - 1, at.y - 1, 3, 3) & cv::Rect({0, 0}, image.size())), mean, deviation);
+  return static_cast<float>(deviation[0]);
+}
+
 bool is_same_surface(float a, float b, float tolerance) { return std::abs(a - b) <= tolerance * b; }
 
 // Marks the blocks with a cell whose depth differs from that of the known cell before it in the row or
@@ -88,37 +124,72 @@ struct DepthConsistency::PackedCells {
   }
 };
 
+// From points of the current camera to z * (column, row, 1) of the grid's table, in a past frame.
+struct DepthConsistency::Projection {
+  Eigen::Matrix3f M;
+  Eigen::Vector3f m;
+};
+
 struct DepthConsistency::Votes {
   explicit Votes(const cv::Size& size)
-      : through(cv::Mat::zeros(size, CV_8UC1)), same(through.clone()), age(cv::Mat::zeros(size, CV_32FC1)) {}
+      : through(cv::Mat::zeros(size, CV_8UC1)),
+        background(through.clone()),
+        same(through.clone()),
+        age(cv::Mat::zeros(size, CV_32FC1)) {}
 
   void copy(int from, int to) {
-    for (cv::Mat* votes : {&through, &same}) votes->data[to] = votes->data[from];
+    for (cv::Mat* votes : {&through, &background, &same}) votes->data[to] = votes->data[from];
     age.ptr<float>()[to] = age.ptr<float>()[from];
   }
 
-  cv::Mat through;  // CV_8UC1 of cells: how many frames saw through the surface
-  cv::Mat same;     // CV_8UC1 of cells: how many saw it
-  cv::Mat age;      // CV_32FC1 of cells: of the oldest that saw it, seconds
+  cv::Mat through;     // CV_8UC1 of cells: how many frames saw through the surface
+  cv::Mat background;  // CV_8UC1 of cells: how many of these saw the background as it looks now
+  cv::Mat same;        // CV_8UC1 of cells: how many saw the surface
+  cv::Mat age;         // CV_32FC1 of cells: of the oldest that saw it, seconds
 };
 
 float DepthConsistency::variance(float depth) const {
-  const auto sigma =
-      static_cast<float>(noise_.depth_sigma) + static_cast<float>(noise_.depth_sigma_growth) * depth * depth;
+  const float sigma = static_cast<float>(noise_.constant) + static_cast<float>(noise_.growth) * depth * depth;
   return sigma * sigma;
 }
 
+// Whether the image of a cell is that of the background, which the past frame saw at that depth.
+bool DepthConsistency::shows_background(const CellGrid& grid, int cell, const cv::Mat& grey,
+                                        const Projection& to_past, const PastDepth& past,
+                                        float background_depth, float gain) const {
+  // The point on the ray of the cell that has the depth of the background in the past frame.
+  const Eigen::Vector3f along = to_past.M * grid.ray(static_cast<std::size_t>(cell));
+  const float distance = (background_depth - to_past.m.z()) / along.z();
+  if (!(along.z() > 0.0F) || !(distance > 0.0F)) return false;
+  const Eigen::Vector3f point = (along * distance + to_past.m) / background_depth;
+  const int seen = grid.cell_at(point.x(), point.y());
+  if (seen < 0) return true;  // the past frame cannot tell
+  const auto at = [&](int index) { return cv::Point(index % grey.cols, index / grey.cols); };
+  // A surface without texture is recognised by its brightness, which has to agree more closely.
+  constexpr float kFlat = 6.0F;  // grey levels
+  const float limit =
+      std::min(kFlat + contrast_around(grey, at(cell)), static_cast<float>(options_.appearance_tolerance));
+  return difference_around(grey, at(cell), past.grey, at(seen), gain) < limit;
+}
+
 // The votes of all past frames on those cells.
-void DepthConsistency::vote(const CellGrid& grid, const PackedCells& cells, const SE3& T_camera_world,
-                            double timestamp, Votes& votes) const {
+void DepthConsistency::vote(const CellGrid& grid, const PackedCells& cells, const cv::Mat& grey,
+                            const SE3& T_camera_world, double timestamp, Votes& votes) const {
   const std::size_t count = cells.cell.size();
   std::vector<float> column(count), row(count), z(count);
   const auto relative_tolerance = static_cast<float>(options_.depth_tolerance);
   const SE3 T_world_camera = T_camera_world.inverse();
+  struct SeenThrough {
+    int cell;
+    float depth;  // of what was seen behind it
+  };
+  std::vector<SeenThrough> through;
+  std::vector<float> ratios;  // of the brightness of cells to that of the past frame where it saw them
   for (const PastDepth& past : past_) {
     const SE3 T_past_camera = past.T_camera_world * T_world_camera;
-    const Eigen::Matrix3f M = grid.projection() * T_past_camera.rotation().toRotationMatrix().cast<float>();
-    const Eigen::Vector3f m = grid.projection() * T_past_camera.translation().cast<float>();
+    const Projection to_past{grid.projection() * T_past_camera.rotation().toRotationMatrix().cast<float>(),
+                             grid.projection() * T_past_camera.translation().cast<float>()};
+    const auto& [M, m] = to_past;
     for (std::size_t i = 0; i < count; ++i) {
       z[i] = M(2, 0) * cells.x[i] + M(2, 1) * cells.y[i] + M(2, 2) * cells.z[i] + m(2);
       const float inverse = 1.0F / z[i];
@@ -126,6 +197,9 @@ void DepthConsistency::vote(const CellGrid& grid, const PackedCells& cells, cons
       row[i] = inverse * (M(1, 0) * cells.x[i] + M(1, 1) * cells.y[i] + M(1, 2) * cells.z[i] + m(1));
     }
     const auto age = static_cast<float>(timestamp - past.timestamp);
+    const bool compares = !grey.empty() && !past.grey.empty();
+    through.clear();
+    ratios.clear();
     for (std::size_t i = 0; i < count; ++i) {
       const int seen = z[i] < 0.05F ? -1 : grid.cell_at(column[i], row[i]);
       const float nearest = seen < 0 ? 0.0F : past.nearest.ptr<float>()[seen];
@@ -134,11 +208,20 @@ void DepthConsistency::vote(const CellGrid& grid, const PackedCells& cells, cons
           3.0F * std::sqrt(cells.variance[i] + variance(nearest)) + relative_tolerance * z[i];
       const int cell = cells.cell[i];
       if (z[i] < nearest - tolerance) {
-        ++votes.through.data[cell];
+        through.push_back({cell, nearest});
       } else if (z[i] <= past.farthest.ptr<float>()[seen] + tolerance) {
         ++votes.same.data[cell];
         votes.age.ptr<float>()[cell] = std::max(votes.age.ptr<float>()[cell], age);
+        if (compares && grey.data[cell] != 255 && past.grey.data[seen] > 0)
+          ratios.push_back(static_cast<float>(grey.data[cell]) / static_cast<float>(past.grey.data[seen]));
       }
+    }
+    // The exposure may have changed.
+    const float gain = ratios.empty() ? 1.0F : upper_median(ratios);
+    for (const auto& [cell, depth] : through) {
+      ++votes.through.data[cell];
+      if (compares && shows_background(grid, cell, grey, to_past, past, depth, gain))
+        ++votes.background.data[cell];
     }
   }
 }
@@ -146,8 +229,9 @@ void DepthConsistency::vote(const CellGrid& grid, const PackedCells& cells, cons
 // Votes on one cell of each block first. Where its surface and those of the neighbouring blocks were seen and
 // never seen through, its votes hold for the other cells of the block that lie on the same surface. Elsewhere
 // each cell is voted on, as it is near depth edges: there a moving object covers what was seen through.
-DepthConsistency::Votes DepthConsistency::votes_on(const CellGrid& grid, const cv::Mat& depth,
+DepthConsistency::Votes DepthConsistency::votes_on(const CellGrid& grid, const CellImages& images,
                                                    const SE3& T_camera_world, double timestamp) const {
+  const cv::Mat& depth = images.depth;
   constexpr int kBlock = 4;  // cells
   Votes votes(grid.size());
   const cv::Size blocks((depth.cols + kBlock - 1) / kBlock, (depth.rows + kBlock - 1) / kBlock);
@@ -170,7 +254,7 @@ DepthConsistency::Votes DepthConsistency::votes_on(const CellGrid& grid, const c
     first.at<int>(block) = cell;
     add(cell);
   });
-  vote(grid, cells, T_camera_world, timestamp, votes);
+  vote(grid, cells, images.grey, T_camera_world, timestamp, votes);
   cv::Mat is_suspect = cv::Mat::zeros(blocks, CV_8UC1);
   for (int i = 0; i < blocks.area(); ++i) {
     const int cell = first.ptr<int>()[i];
@@ -189,18 +273,20 @@ DepthConsistency::Votes DepthConsistency::votes_on(const CellGrid& grid, const c
     else if (cell != known)
       add(cell);
   });
-  vote(grid, cells, T_camera_world, timestamp, votes);
+  vote(grid, cells, images.grey, T_camera_world, timestamp, votes);
   return votes;
 }
 
-DepthEvidence DepthConsistency::examine(const CellGrid& grid, const cv::Mat& depth, const SE3& T_camera_world,
-                                        double timestamp) const {
-  const Votes votes = votes_on(grid, depth, T_camera_world, timestamp);
+DepthEvidence DepthConsistency::examine(const CellGrid& grid, const CellImages& cells,
+                                        const SE3& T_camera_world, double timestamp) const {
+  const Votes votes = votes_on(grid, cells, T_camera_world, timestamp);
   DepthEvidence evidence{cv::Mat::zeros(grid.size(), CV_8UC1), votes.age};
   if (past_.empty()) return evidence;
   const int needed = std::min<int>(2, static_cast<int>(past_.size()));
   constexpr int kMinSupport = 5;  // cells
-  const cv::Mat moving = with_support(votes.through, needed, kMinSupport);
+  cv::Mat through = votes.through.clone();
+  through.setTo(0, votes.background * 2.0 > votes.through);
+  const cv::Mat moving = with_support(through, needed, kMinSupport);
   for (std::size_t i = 0; i < grid.cells(); ++i) {
     if (moving.data[i] != 0) {
       evidence.state.data[i] = static_cast<std::uint8_t>(MotionEvidence::kMoving);
@@ -215,11 +301,11 @@ void DepthConsistency::apply_correction(const SE3& T_new_old) {
   for (auto& past : past_) past.T_camera_world = past.T_camera_world * T_new_old.inverse();
 }
 
-void DepthConsistency::add(const cv::Mat& depth, const SE3& T_camera_world, double timestamp) {
+void DepthConsistency::add(const CellImages& cells, const SE3& T_camera_world, double timestamp) {
   while (!past_.empty() && timestamp - past_.front().timestamp > options_.history) past_.pop_front();
   if (!past_.empty() && timestamp - past_.back().timestamp < options_.history_interval) return;
-  PastDepth past{timestamp, T_camera_world, {}, {}};
-  depth_range(depth, past.nearest, past.farthest);
+  PastDepth past{timestamp, T_camera_world, {}, {}, cells.grey};
+  depth_range(cells.depth, past.nearest, past.farthest);
   past_.push_back(std::move(past));
 }
 

@@ -8,7 +8,7 @@
 
 #include "roslam/dynamic_objects/cell_grid.hpp"
 #include "roslam/dynamic_objects/dynamic_object_options.hpp"
-#include "roslam/estimation/measurement_model.hpp"
+#include "roslam/geometry/depth_noise.hpp"
 #include "roslam/geometry/se3.hpp"
 
 namespace roslam {
@@ -26,20 +26,29 @@ struct DepthEvidence {
   cv::Mat static_for;  ///< CV_32FC1 of cells: age (seconds) of the oldest frame with the same surface, or 0
 };
 
+/// A frame in cells of a CellGrid.
+struct CellImages {
+  cv::Mat depth;  ///< CV_32FC1, metres, 0 = unknown (CellGrid::depth_cells)
+  cv::Mat grey;   ///< CV_8UC1, mean brightness (CellGrid::grey_cells); empty: appearance is not compared
+};
+
 /// Checks a frame against the depth of the last seconds: a surface in what was free space has moved there.
 /// Occlusion and disocclusion of static surfaces cannot cause false positives, only noise of depth and pose
-/// can. Related to the multi-view check of DynaSLAM (Bescos et al., RA-L 2018), in the opposite direction.
+/// can. What enters free space hides what was seen behind it, so where the image still shows that background,
+/// the depth is wrong, as stereo cameras' is in patches on surfaces without texture. Related to the
+/// multi-view check of DynaSLAM (Bescos et al., RA-L 2018), in the opposite direction.
 class DepthConsistency {
  public:
-  DepthConsistency(const DynamicObjectOptions& options, const MeasurementNoise& noise)
+  DepthConsistency(const DynamicObjectOptions& options, const DepthNoise& noise)
       : options_(options), noise_(noise) {}
 
-  /// depth: of cells (CellGrid::depth_cells).
-  DepthEvidence examine(const CellGrid& grid, const cv::Mat& depth, const SE3& T_camera_world,
+  void set_depth_noise(const DepthNoise& noise) { noise_ = noise; }
+
+  DepthEvidence examine(const CellGrid& grid, const CellImages& cells, const SE3& T_camera_world,
                         double timestamp) const;
 
-  /// Stores a frame if history_interval has passed since the last one. depth: of cells.
-  void add(const cv::Mat& depth, const SE3& T_camera_world, double timestamp);
+  /// Stores a frame if history_interval has passed since the last one.
+  void add(const CellImages& cells, const SE3& T_camera_world, double timestamp);
 
   /// Applies a correction of the map; T_new_old maps old to new world coordinates.
   void apply_correction(const SE3& T_new_old);
@@ -55,19 +64,23 @@ class DepthConsistency {
     SE3 T_camera_world;
     cv::Mat nearest;   // CV_32FC1: least depth around each cell, 0 = unknown at the cell
     cv::Mat farthest;  // CV_32FC1: largest depth around each cell
+    cv::Mat grey;      // CV_8UC1, or empty
   };
 
   struct PackedCells;
   struct Votes;
+  struct Projection;
 
-  Votes votes_on(const CellGrid& grid, const cv::Mat& depth, const SE3& T_camera_world,
+  Votes votes_on(const CellGrid& grid, const CellImages& images, const SE3& T_camera_world,
                  double timestamp) const;
-  void vote(const CellGrid& grid, const PackedCells& cells, const SE3& T_camera_world, double timestamp,
-            Votes& votes) const;
+  void vote(const CellGrid& grid, const PackedCells& cells, const cv::Mat& grey, const SE3& T_camera_world,
+            double timestamp, Votes& votes) const;
+  bool shows_background(const CellGrid& grid, int cell, const cv::Mat& grey, const Projection& to_past,
+                        const PastDepth& past, float background_depth, float gain) const;
   float variance(float depth) const;
 
   DynamicObjectOptions options_;
-  MeasurementNoise noise_;
+  DepthNoise noise_;
   std::deque<PastDepth> past_;
 };
 

@@ -43,7 +43,7 @@ DynamicObjectDetector::DynamicObjectDetector(const Camera& camera, const Setting
       grid_(camera),
       corners_(camera),
       flow_(camera, settings.dynamic_objects, settings.depth, settings.noise, settings.pose),
-      history_(settings.dynamic_objects, settings.noise),
+      history_(settings.dynamic_objects, settings.noise.depth_noise()),
       object_tracker_(settings.dynamic_objects) {
   settings.dynamic_objects.validate();
 }
@@ -68,7 +68,7 @@ DynamicObjects DynamicObjectDetector::detect(const Frame& frame, const cv::Mat& 
   assess_objects(scene);
   if (options.depth_consistency && !history_.empty()) {
     const cv::Mat barrier = scene.cells_that_are(MotionEvidence::kStatic);
-    grow_masks(scene.owners, {depth_cells_, barrier, scene.seeds, scene.moving}, grid_, options.growth);
+    grow_masks(scene.owners, {cells_.depth, barrier, scene.seeds, scene.moving}, grid_, options.growth);
   }
   if (examine_geometry && (options.depth_consistency || options.flow)) add_unlabelled(scene);
   DynamicObjects dynamic_objects = compose_masks(scene);
@@ -79,7 +79,7 @@ DynamicObjects DynamicObjectDetector::detect(const Frame& frame, const cv::Mat& 
 void DynamicObjectDetector::begin_frame(const Frame& frame, const cv::Mat& grey,
                                         const std::optional<SE3>& predicted_T_camera_world) {
   current_ = {frame.index, frame.timestamp, flow_pyramid(grey), frame.depth, predicted_T_camera_world, {}};
-  depth_cells_ = grid_.depth_cells(frame.depth, settings_.depth);
+  cells_ = {grid_.depth_cells(frame.depth, settings_.depth), grid_.grey_cells(grey)};
   pose_from_flow_.reset();
   if (!past_.empty()) pose_from_flow_ = flow_.track(past_.back(), current_);
 }
@@ -87,10 +87,9 @@ void DynamicObjectDetector::begin_frame(const Frame& frame, const cv::Mat& grey,
 CellScene DynamicObjectDetector::gather_evidence(bool examine_geometry) {
   const DynamicObjectOptions& options = settings_.dynamic_objects;
   CellScene scene;
-  scene.depth = depth_cells_;
+  scene.depth = cells_.depth;
   if (examine_geometry && options.depth_consistency && current_.T_camera_world) {
-    scene.depth_evidence =
-        history_.examine(grid_, depth_cells_, *current_.T_camera_world, current_.timestamp);
+    scene.depth_evidence = history_.examine(grid_, cells_, *current_.T_camera_world, current_.timestamp);
   } else {
     scene.depth_evidence = {cv::Mat::zeros(grid_.size(), CV_8UC1), cv::Mat::zeros(grid_.size(), CV_32FC1)};
   }
@@ -153,7 +152,7 @@ std::optional<std::vector<MovableObject>> DynamicObjectDetector::labelled_object
     return std::nullopt;
   }
   const double least = settings_.dynamic_objects.min_object_share;
-  if (labels.index == current_.index) return find_objects(labels.segmentation, depth_cells_, grid_, least);
+  if (labels.index == current_.index) return find_objects(labels.segmentation, cells_.depth, grid_, least);
   const PastFrame* past = settings_.dynamic_objects.carry ? past_frame(labels.index) : nullptr;
   if (past == nullptr) {
     ++faults_["labels came too late"];
@@ -200,7 +199,7 @@ void DynamicObjectDetector::add_unlabelled(CellScene& scene) {
   const int count = cv::connectedComponents(joined, numbers, 4, CV_32S);
   numbers.setTo(0, seeds == 0);
   const cv::Mat barrier = scene.cells_that_are(MotionEvidence::kStatic) | (scene.owners != 0);
-  grow_masks(numbers, {depth_cells_, barrier, seeds, scene.moving}, grid_, options.growth);
+  grow_masks(numbers, {cells_.depth, barrier, seeds, scene.moving}, grid_, options.growth);
   const auto evidence = evidence_by_owner(numbers, static_cast<std::size_t>(count), scene.depth_evidence,
                                           scene.flow, grid_, options);
   const double least = std::max(8.0, options.min_object_share * static_cast<double>(grid_.cells()));
@@ -215,7 +214,7 @@ void DynamicObjectDetector::add_unlabelled(CellScene& scene) {
     object.kind = Movable::kUnknown;
     object.box = grid_.pixels_of(box);
     object.mask = grid_.in_pixels(numbers(box) == n, box);
-    object.median_depth = median_depth(object, depth_cells_, grid_);
+    object.median_depth = median_depth(object, cells_.depth, grid_);
     found.push_back(std::move(object));
     found_numbers.push_back(n);
   }
@@ -265,7 +264,7 @@ DynamicObjects DynamicObjectDetector::compose_masks(const CellScene& scene) {
     }
     object.box = boxes[i + 1] + area.tl();
     object.mask = object_mask;
-    object.median_depth = median_depth(object, depth_cells_, grid_);
+    object.median_depth = median_depth(object, cells_.depth, grid_);
     draw_object(object, mask);
     if (object.is_at_rest) {
       if (resting.empty()) resting = cv::Mat::zeros(image, CV_8UC1);
@@ -288,6 +287,13 @@ DynamicObjects DynamicObjectDetector::compose_masks(const CellScene& scene) {
   dynamic_objects.mask = mask;
   dynamic_objects.resting = resting;
   return dynamic_objects;
+}
+
+void DynamicObjectDetector::set_depth_noise(const DepthNoise& noise) {
+  const DepthNoise least = settings_.noise.depth_noise();
+  const DepthNoise used{std::max(noise.constant, least.constant), std::max(noise.growth, least.growth)};
+  flow_.set_depth_noise(used);
+  history_.set_depth_noise(used);
 }
 
 void DynamicObjectDetector::apply_correction(const SE3& T_new_old) {
@@ -320,7 +326,7 @@ void DynamicObjectDetector::remember(const std::optional<SE3>& T_camera_world,
   corners_.replenish(current_.corners, points, false);
   corners_.replenish(current_.corners, removed_points, true);
   if (T_camera_world && settings_.dynamic_objects.depth_consistency) {
-    history_.add(depth_cells_, *T_camera_world, current_.timestamp);
+    history_.add(cells_, *T_camera_world, current_.timestamp);
   }
   while (!past_.empty() && current_.timestamp - past_.front().timestamp > kPastKept) past_.pop_front();
   past_.push_back(std::move(current_));

@@ -56,6 +56,10 @@ class DynamicObjectDetector {
   void remember(const std::optional<SE3>& T_camera_world, const std::vector<cv::Point2f>& points,
                 const std::vector<cv::Point2f>& removed_points);
 
+  /// The estimated noise of the depth camera. Where it is less than the settings say it changes nothing:
+  /// among frames of some seconds the errors of poses and calibration outweigh it.
+  void set_depth_noise(const DepthNoise& noise);
+
   /// Applies a correction of the map to the stored frames; T_new_old maps old to new world coordinates.
   void apply_correction(const SE3& T_new_old);
 
@@ -90,7 +94,7 @@ class DynamicObjectDetector {
   DepthConsistency history_;
   ObjectTracker object_tracker_;
   PastFrame current_;
-  cv::Mat depth_cells_;                // of the current frame
+  CellImages cells_;                   // of the current frame
   cv::Mat mask_;                       // of the current frame; empty = nothing is removed
   std::optional<SE3> pose_from_flow_;  // of the current frame
   std::deque<PastFrame> past_;

@@ -23,6 +23,8 @@ void DynamicObjectOptions::validate() const {
           "history_interval must be above 0 and at most 60 seconds");
   require(history >= history_interval && history <= 40.0 * history_interval,
           "history must be 1 to 40 times history_interval (seconds)");
+  require(appearance_tolerance >= 0.0 && appearance_tolerance < 256.0,
+          "appearance_tolerance must be 0 to 255 grey levels");
   require(depth_tolerance >= 0.0 && depth_tolerance < 1.0, "depth_tolerance must be 0 to 1");
   require(flow_interval > 0.0 && flow_interval <= 1.0, "flow_interval must be above 0 and at most 1 second");
   require(flow_tolerance > 0.0 && flow_tolerance <= 100.0, "flow_tolerance must be above 0 and at most 100");

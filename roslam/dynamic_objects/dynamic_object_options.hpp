@@ -28,11 +28,12 @@ struct ROSLAM_EXPORT DynamicObjectOptions {
   double keep_missed = 0.5;          ///< seconds that an object of min_confidence is kept if labels miss it
 
   // Geometry.
-  double history = 2.5;            ///< seconds of depth images that a frame is compared with
-  double history_interval = 0.25;  ///< seconds between two depth images that are kept
-  double depth_tolerance = 0.03;   ///< share of the depth, beside three sigmas of noise, that may differ
-  double flow_interval = 0.13;     ///< seconds over which points are tracked to detect motion
-  double flow_tolerance = 3.5;     ///< sigmas that a static point may differ from its predicted position
+  double history = 2.5;                ///< seconds of depth images that a frame is compared with
+  double history_interval = 0.25;      ///< seconds between two depth images that are kept
+  double depth_tolerance = 0.03;       ///< share of the depth, beside three sigmas of noise, that may differ
+  double appearance_tolerance = 20.0;  ///< grey levels, at most, by which the background may look different
+  double flow_interval = 0.13;         ///< seconds over which points are tracked to detect motion
+  double flow_tolerance = 3.5;         ///< sigmas that a static point may differ from its predicted position
   double rest = 2.0;  ///< seconds without motion after which an object of min_confidence is at rest
 
   // From evidence to mask.

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
 #include "roslam/common/export.hpp"
+#include "roslam/geometry/depth_noise.hpp"
 
 namespace roslam {
 
@@ -16,7 +19,16 @@ struct ROSLAM_EXPORT MeasurementNoise {
   /// limit they are outliers. A larger factor lets wrong matches support a wrong pose.
   double outlier_factor = 1.0;
 
-  double sigma_of_depth(double depth) const { return depth_sigma + depth_sigma_growth * depth * depth; }
+  /// The noise is estimated while the pose is tracked; estimates, and the depth noise that the camera's
+  /// calibration states, replace the values above.
+  bool estimate = true;
+
+  /// This model, with what is known of the noise of an image.
+  MeasurementNoise known_of(const std::optional<double>& pixels,
+                            const std::optional<DepthNoise>& depth) const;
+
+  DepthNoise depth_noise() const { return {depth_sigma, depth_sigma_growth}; }
+  double sigma_of_depth(double depth) const { return depth_noise().sigma(depth); }
 
   /// Throws OptionsError naming the field.
   void validate() const;

@@ -17,6 +17,17 @@ void MeasurementNoise::validate() const {
   }
 }
 
+MeasurementNoise MeasurementNoise::known_of(const std::optional<double>& pixels,
+                                            const std::optional<DepthNoise>& depth) const {
+  MeasurementNoise known = *this;
+  if (pixels) known.pixel_sigma = *pixels;
+  if (depth) {
+    known.depth_sigma = depth->constant;
+    known.depth_sigma_growth = depth->growth;
+  }
+  return known;
+}
+
 Measurement Measurement::make(const Eigen::Vector2f& pixel, float depth, float scale,
                               const MeasurementNoise& noise) {
   Measurement m;

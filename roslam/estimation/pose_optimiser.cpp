@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "roslam/common/error.hpp"
+#include "roslam/common/upper_median.hpp"
 
 namespace roslam {
 
@@ -56,6 +57,20 @@ Matrix6d covariance_of(const NormalEquations& system, std::size_t rows) {
   const Matrix6d information = system.hessian.selfadjointView<Eigen::Lower>();
   const Matrix6d inverse = information.ldlt().solve(Matrix6d::Identity());
   return std::max(kLeastScale, system.weighted / freedom) * 0.5 * (inverse + inverse.transpose());
+}
+
+// Robust standard deviation of the pixel errors, in units of the assumed one.
+double scale_of_pixel_errors(const Camera& camera, const Measurements& measurements,
+                             const SE3& T_camera_world) {
+  constexpr double kSigmaOfMedian = 1.1774;  // median of a Rayleigh distribution, in sigmas
+  std::vector<double> errors;
+  errors.reserve(measurements.size());
+  for (const PoseMeasurement& m : measurements) {
+    const Eigen::Vector3d point = T_camera_world * m.point_world;
+    if (point.z() <= kMinDepth) continue;
+    errors.push_back(m.measurement.pixel_weight * (camera.project(point) - m.measurement.pixel).norm());
+  }
+  return errors.empty() ? 0.0 : upper_median(errors) / kSigmaOfMedian;
 }
 
 NormalEquations linearise(const Camera& camera, const Measurements& measurements, const OptimisedPose& pose) {
@@ -127,6 +142,7 @@ OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurem
     classify(camera, measurements, result);
   }
   if (result.inliers < 3 || !result.T_camera_world.is_finite()) return failed;
+  result.pixel_error_scale = scale_of_pixel_errors(camera, measurements, result.T_camera_world);
   std::size_t rows = 0;
   for (std::size_t i = 0; i < measurements.size(); ++i) {
     if (result.is_inlier[i]) rows += measurements[i].measurement.has_depth() ? 3 : 2;

@@ -22,6 +22,10 @@ struct OptimisedPose {
   std::vector<bool> is_inlier;  ///< one per measurement
   int inliers = 0;
 
+  /// Standard deviation of the pixel errors of all measurements, inliers or not, in the sigmas assumed; by
+  /// their median. 1 if the noise model is right; 0 if there is no pose.
+  double pixel_error_scale = 0.0;
+
   /// Of the pose, perturbed from the left: T = exp(x) T_camera_world with x = (translation m, rotation rad)
   /// in the camera frame. By the inliers with their weights and the scale of their errors, as if landmarks
   /// were exact; zero if there is no pose.

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "roslam/features/feature_options.hpp"
 #include "roslam/features/orb_extractor.hpp"
 #include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/depth_noise.hpp"
 
 namespace roslam {
 
@@ -28,6 +30,10 @@ struct ROSLAM_EXPORT ObservedFrame {
   std::vector<bool>
       is_movable;    ///< on a movable object at rest: used for the pose, never mapped; empty = none
   FeatureGrid grid;  ///< over pixels
+
+  // Noise as known when the image was taken; where unset it is as the options say.
+  std::optional<double> pixel_sigma;  ///< at the finest level
+  std::optional<DepthNoise> depth_noise;
 
   std::size_t size() const { return pixels.size(); }
   bool may_move(std::size_t point) const { return point < is_movable.size() && is_movable[point]; }

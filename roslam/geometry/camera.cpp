@@ -59,6 +59,11 @@ void Camera::validate() const {
   require(depth_units_per_metre == 0.0 || positive(depth_units_per_metre),
           "depth_units_per_metre must be positive, got " + std::to_string(depth_units_per_metre) + "; " +
               std::string(usual_depth_units()));
+  if (depth_noise) {
+    const auto [constant, growth] = *depth_noise;
+    require(constant >= 0.0 && constant < 10.0 && growth >= 0.0 && growth < 10.0 && constant + growth > 0.0,
+            "depth_noise must have constant (metres) and growth (1/metre) of 0 to 10, not both 0");
+  }
   require(positive(fps) && fps <= 10000.0, "fps must be positive, got " + std::to_string(fps));
 }
 

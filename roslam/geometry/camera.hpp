@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "roslam/common/export.hpp"
+#include "roslam/geometry/depth_noise.hpp"
 
 namespace roslam {
 
@@ -23,8 +24,9 @@ struct ROSLAM_EXPORT Camera {
   double cx = 319.5;                                ///< pixels
   double cy = 239.5;                                ///< pixels
   std::array<double, 5> distortion{0, 0, 0, 0, 0};  ///< k1, k2, p1, p2, k3
-  double depth_units_per_metre = 0.0;  ///< value of a 16-bit depth image at one metre; 0: not set
-  double fps = 30.0;                   ///< frames a second
+  double depth_units_per_metre = 0.0;          ///< value of a 16-bit depth image at one metre; 0: not set
+  double fps = 30.0;                           ///< frames a second
+  std::optional<DepthNoise> depth_noise = {};  ///< if known; where images begin to show it that counts
 
   /// Throws CalibrationError naming the field that is out of range. depth_units_per_metre may be 0 (not set):
   /// depth in metres needs none, and a source of 16-bit depth refuses it.
@@ -67,10 +69,10 @@ ROSLAM_EXPORT std::optional<Camera> camera_preset(std::string_view name);
 /// The usual values of depth_units_per_metre, as the remedy of an error message.
 ROSLAM_EXPORT std::string_view usual_depth_units();
 
-/// Reads a camera file (YAML: model, width, height, fx, fy, cx, cy, distortion, depth_units_per_metre, fps);
-/// only model, distortion and fps (30) have defaults. distortion: k1 k2 p1 p2 k3, k1 k2 p1 p2, k1 k2, or
-/// none. Throws InputError for a missing or malformed file or an unknown key, CalibrationError as validate
-/// does.
+/// Reads a camera file (YAML: model, width, height, fx, fy, cx, cy, distortion, depth_units_per_metre, fps,
+/// depth_noise: {constant, growth}); only model, distortion, fps (30) and depth_noise have defaults.
+/// distortion: k1 k2 p1 p2 k3, k1 k2 p1 p2, k1 k2, or none. Throws InputError for a missing or malformed file
+/// or an unknown key, CalibrationError as validate does.
 ROSLAM_EXPORT Camera read_camera(const std::filesystem::path& file);
 
 /// A preset name or a camera file. Throws as read_camera does.

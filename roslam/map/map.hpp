@@ -178,7 +178,8 @@ class ROSLAM_EXPORT Map {
   /// The measurement of a point, with its noise.
   Measurement measurement(const ObservedFrame& view, std::uint32_t point,
                           const MeasurementNoise& noise) const {
-    return Measurement::make(view.pixels[point], view.depths[point], scale(view.levels[point]), noise);
+    return Measurement::make(view.pixels[point], view.depths[point], scale(view.levels[point]),
+                             noise.known_of(view.pixel_sigma, view.depth_noise));
   }
 
   /// Pyramid level at which a landmark is expected from a distance (metres).

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/map_io/map_file.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "roslam/common/binary.hpp"
 #include "roslam/common/error.hpp"
@@ -9,7 +14,10 @@
 namespace roslam {
 
 namespace {
-constexpr BinaryFormat kFormat{"ROSLAMMP", 1, "a map", 2047ULL * 1024 * 1024};
+// Version 2 has the measurement noise at the end. A map of which none is known is written in version 1, so
+// that earlier programs read it.
+constexpr BinaryFormat kFormat{"ROSLAMMP", 2, "a map", 2047ULL * 1024 * 1024, 1};
+constexpr BinaryFormat kFormatWithoutNoise{"ROSLAMMP", 1, "a map", 2047ULL * 1024 * 1024};
 constexpr std::size_t kPointBytes = 8 + 4 + 1 + 4 + 3 + sizeof(Descriptor) + 1;
 constexpr std::size_t kWordBytes = 4 + 4;
 constexpr std::size_t kObservationBytes = 4 + 4;
@@ -17,6 +25,7 @@ constexpr std::size_t kPoseBytes = 7 * 8;
 constexpr std::size_t kKeyframeBytes = 8 + 8 + kPoseBytes + 4 + 4 + 4 + 4;
 constexpr std::size_t kLandmarkBytes = 2 * 24 + sizeof(Descriptor) + 2 * 4 + 4 + 3 * 4 + 3 + 4;
 constexpr std::size_t kLoopBytes = 4 + 4 + kPoseBytes;
+constexpr double kMaxNoise = 1e6;  // pixels, metres, 1/metre
 
 void put(BinaryWriter& writer, const Descriptor& descriptor) {
   for (const std::uint64_t part : descriptor) writer.put(part);
@@ -90,6 +99,29 @@ void put(BinaryWriter& writer, const Landmark& landmark) {
   }
 }
 
+void put(BinaryWriter& writer, const std::optional<DepthNoise>& noise) {
+  writer.put(noise ? noise->constant : 0.0);
+  writer.put(noise ? noise->growth : 0.0);
+}
+
+bool has_noise(const SavedMap& saved) {
+  if (saved.camera.depth_noise) return true;
+  const auto ids = saved.map.keyframe_ids();
+  return std::any_of(ids.begin(), ids.end(), [&](KeyframeId id) {
+    const ObservedFrame& view = *saved.map.find(id)->view;
+    return view.pixel_sigma.has_value() || view.depth_noise.has_value();
+  });
+}
+
+void put_noise(BinaryWriter& writer, const SavedMap& saved) {
+  put(writer, saved.camera.depth_noise);
+  for (const KeyframeId id : saved.map.keyframe_ids()) {
+    const ObservedFrame& view = *saved.map.find(id)->view;
+    writer.put(view.pixel_sigma.value_or(0.0));
+    put(writer, view.depth_noise);
+  }
+}
+
 // Decodes a map and validates every value, so that any file gives a valid map or an error.
 class Decoder {
  public:
@@ -104,8 +136,12 @@ class Decoder {
     levels_ = saved.map.scales().size();
     saved.vocabulary = in_.get<std::uint64_t>();
     const std::size_t keyframes = in_.get_count(kKeyframeBytes);
+    std::vector<std::shared_ptr<ObservedFrame>> views;
     for (std::size_t i = 0; i < keyframes; ++i) {
-      saved.map.insert(get_keyframe());
+      Keyframe keyframe = get_keyframe();
+      views.push_back(get_observed_frame());
+      keyframe.view = views.back();
+      saved.map.insert(std::move(keyframe));
       saved.words.push_back(get_words());
     }
     const std::size_t landmarks = in_.get_count(kLandmarkBytes);
@@ -118,6 +154,7 @@ class Decoder {
               "it has a loop within one keyframe or between submaps");
       saved.map.add_loop(from, to, get_motion());
     }
+    if (in_.left() > 0) get_noise(saved.camera, views);
     require(in_.left() == 0, "it has data after its end");
     return saved;
   }
@@ -168,11 +205,7 @@ class Decoder {
     for (double& value : camera.distortion) value = in_.get<double>();
     camera.depth_units_per_metre = in_.get<double>();
     camera.fps = in_.get<double>();
-    try {
-      camera.validate();
-    } catch (const CalibrationError& error) {
-      in_.fail(std::string("its camera is invalid (") + error.what() + ")");
-    }
+    require_valid(camera);
     return camera;
   }
 
@@ -188,7 +221,36 @@ class Decoder {
     return scales;
   }
 
-  std::shared_ptr<const ObservedFrame> get_observed_frame() {
+  std::optional<DepthNoise> get_depth_noise() {
+    const DepthNoise noise{get_sigma(), get_sigma()};
+    if (noise.constant > 0.0 || noise.growth > 0.0) return noise;
+    return std::nullopt;
+  }
+
+  double get_sigma() {
+    const auto sigma = get_finite<double>();
+    require(sigma >= 0.0 && sigma < kMaxNoise, "it contains a noise out of range");
+    return sigma;
+  }
+
+  void get_noise(Camera& camera, const std::vector<std::shared_ptr<ObservedFrame>>& views) {
+    camera.depth_noise = get_depth_noise();
+    for (const auto& view : views) {
+      if (const double sigma = get_sigma(); sigma > 0.0) view->pixel_sigma = sigma;
+      view->depth_noise = get_depth_noise();
+    }
+    require_valid(camera);
+  }
+
+  void require_valid(const Camera& camera) const {
+    try {
+      camera.validate();
+    } catch (const CalibrationError& error) {
+      in_.fail(std::string("its camera is invalid (") + error.what() + ")");
+    }
+  }
+
+  std::shared_ptr<ObservedFrame> get_observed_frame() {
     const auto view = std::make_shared<ObservedFrame>();
     const std::size_t points = in_.get_count(kPointBytes);
     require(points > 0, "it has a keyframe without points");
@@ -221,7 +283,6 @@ class Decoder {
     keyframe.session = in_.get<std::uint32_t>();
     constexpr std::uint32_t kMany = 1U << 24U;
     require(keyframe.submap.value < kMany && keyframe.session < kMany, "it has too many submaps or sessions");
-    keyframe.view = get_observed_frame();
     return keyframe;
   }
 
@@ -301,6 +362,7 @@ std::string encode_map(const SavedMap& saved) {
     writer.put(loop.to.value);
     put(writer, loop.T_to_from);
   }
+  if (has_noise(saved)) put_noise(writer, saved);
   return std::move(writer).bytes();
 }
 
@@ -309,7 +371,7 @@ SavedMap decode_map(std::string_view content, const std::string& name) {
 }
 
 void save_map(const std::filesystem::path& file, const SavedMap& saved) {
-  write_binary(file, kFormat, encode_map(saved));
+  write_binary(file, has_noise(saved) ? kFormat : kFormatWithoutNoise, encode_map(saved));
 }
 
 SavedMap load_map(const std::filesystem::path& file) {

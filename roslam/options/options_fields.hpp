@@ -23,6 +23,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("noise", "depth_sigma", o.noise.depth_sigma);
   visit("noise", "depth_sigma_growth", o.noise.depth_sigma_growth);
   visit("noise", "outlier_factor", o.noise.outlier_factor);
+  visit("noise", "estimate", o.noise.estimate);
   visit("segmenter", "working_side", o.segmenter.working_side);
   visit("segmenter", "threads", o.segmenter.threads);
   visit("dynamic_objects", "labels", o.dynamic_objects.labels);
@@ -39,6 +40,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("dynamic_objects", "history", o.dynamic_objects.history);
   visit("dynamic_objects", "history_interval", o.dynamic_objects.history_interval);
   visit("dynamic_objects", "depth_tolerance", o.dynamic_objects.depth_tolerance);
+  visit("dynamic_objects", "appearance_tolerance", o.dynamic_objects.appearance_tolerance);
   visit("dynamic_objects", "flow_interval", o.dynamic_objects.flow_interval);
   visit("dynamic_objects", "flow_tolerance", o.dynamic_objects.flow_tolerance);
   visit("dynamic_objects", "rest", o.dynamic_objects.rest);

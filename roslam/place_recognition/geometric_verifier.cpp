@@ -228,7 +228,11 @@ void GeometricVerifier::fit(const Map& map, const ObservedFrame& frame, Verified
       match.landmarks[i] = {};
       continue;
     }
-    measurements.push_back({landmark->position, map.measurement(frame, i, settings_.noise)});
+    // With the noise assumed, not the estimated one, which may be less: places match over the drift of the
+    // map.
+    measurements.push_back(
+        {landmark->position,
+         Measurement::make(frame.pixels[i], frame.depths[i], map.scale(frame.levels[i]), settings_.noise)});
     points.push_back(i);
   }
   const OptimisedPose pose = optimise_pose(camera_, measurements, match.T_camera_world, settings_.pose);

@@ -17,6 +17,7 @@ FrontEnd::FrontEnd(const Camera& camera, const Options& options, Mode mode,
       mode_(mode),
       load_(load),
       depth_check_(camera.fx),
+      noise_(camera, options.noise),
       segmentation_(options.dynamic_objects.labels ? std::move(segmenter) : nullptr, mode, options.threads),
       detector_(camera, detector_settings(options)),
       extractor_(options.orb) {}
@@ -35,6 +36,7 @@ FrontEndResult FrontEnd::observe(const Frame& frame, const cv::Mat& mask,
   brightness_.update(grey);
   grey = brightness_.apply(grey);
   check_input(frame, grey, result);
+  depth_ = frame.depth;
   if (detects()) result.dynamic_objects = detect(frame, grey, predicted_T_camera_world, frame_count);
   result.detection_seconds = watch.seconds();
   extract(frame, grey, mask, frame_count, result);
@@ -107,6 +109,7 @@ void FrontEnd::extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& m
       view->is_movable.push_back(resting.at<std::uint8_t>(pixel) != 0);
     }
   }
+  noise_.note_in(*view);
   result.view = std::move(view);
 }
 
@@ -117,6 +120,7 @@ bool FrontEnd::follow_corrections(const Map& map, const std::optional<SE3>& trac
     detector_.apply_correction(tracked_T_camera_world->inverse() * *measured_T_camera_world_);
     measured_T_camera_world_ = tracked_T_camera_world;
   }
+  noise_.interrupt();
   return true;
 }
 
@@ -131,9 +135,14 @@ void FrontEnd::remember(const TrackedFrame& frame, const Map& map, const FrontEn
     const bool is_other_submap =
         last_reference_.is_valid() &&
         (!frame.reference.is_valid() || map.submap_of(frame.reference) != map.submap_of(last_reference_));
-    if (is_other_submap) detector_.leave_submap();
+    if (is_other_submap) {
+      detector_.leave_submap();
+      noise_.interrupt();
+    }
     last_reference_ = frame.reference;
   }
+  noise_.add(frame, depth_, observation.dynamic_objects.mask);
+  if (const auto depth_noise = noise_.depth()) detector_.set_depth_noise(*depth_noise);
   if (detects())
     detector_.remember(is_measured ? frame.T_camera_world : std::nullopt, observation.points,
                        observation.removed_points);
@@ -142,6 +151,7 @@ void FrontEnd::remember(const TrackedFrame& frame, const Map& map, const FrontEn
 void FrontEnd::reset() {
   detector_.reset();
   depth_check_.restart_clock();
+  noise_.interrupt();
   labels_.release();
 }
 

@@ -18,6 +18,7 @@
 #include "roslam/options/options.hpp"
 #include "roslam/sensors/depth_check.hpp"
 #include "roslam/sensors/frame_source.hpp"
+#include "roslam/slam/camera_noise.hpp"
 #include "roslam/slam/load_control.hpp"
 #include "roslam/slam/segmentation_worker.hpp"
 #include "roslam/tracking/tracker.hpp"
@@ -77,6 +78,8 @@ class FrontEnd {
   std::vector<float> level_scales() const;
   std::map<std::string, std::size_t> faults() const;
 
+  const CameraNoise& noise() const { return noise_; }
+
   /// What is doubtful about the input so far, in words, and in how many frames.
   std::map<std::string, std::size_t> warnings() const;
   StageTimes times() const { return segmentation_.times(); }
@@ -95,6 +98,7 @@ class FrontEnd {
   const LoadControl* load_;
   BrightnessNormaliser brightness_;
   DepthCheck depth_check_;
+  CameraNoise noise_;
   std::set<std::string> warned_;  // warnings that were handed out
   SegmentationWorker segmentation_;
   DynamicObjectDetector detector_;
@@ -106,6 +110,7 @@ class FrontEnd {
   // The last frame whose pose was measured: pose in the map as it was by then, and how often it was corrected
   // by then.
   std::optional<SE3> measured_T_camera_world_;
+  cv::Mat depth_;  // of the frame observed last
   std::size_t map_revision_ = 0;
   KeyframeId last_reference_;
 };

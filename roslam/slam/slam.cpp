@@ -137,6 +137,8 @@ const std::map<TrackingState, std::size_t>& Slam::frames_by_state() const { retu
 const std::map<RejectReason, std::size_t>& Slam::rejected() const { return impl_->log.rejected(); }
 std::size_t Slam::clock_resets() const { return impl_->log.clock_resets(); }
 
+MeasurementNoise Slam::measurement_noise() const { return impl_->front_end.noise().of_features(); }
+
 std::map<std::string, std::size_t> Slam::doubted_poses() const {
   std::map<std::string, std::size_t> doubted;
   for (const auto& [doubt, count] : impl_->tracker.doubts()) doubted[std::string(describe(doubt))] = count;

@@ -144,6 +144,9 @@ class ROSLAM_EXPORT Slam {
   /// inliers). Another pose may have been found for the same frame.
   std::map<std::string, std::size_t> doubted_poses() const;
 
+  /// The noise of features as it is now assumed or estimated (MeasurementNoise::estimate).
+  MeasurementNoise measurement_noise() const;
+
   /// Processor time of every stage so far.
   StageTimes times() const;
 

@@ -19,6 +19,7 @@ struct TrackedFrame {
   std::shared_ptr<const ObservedFrame> view;
   std::optional<SE3> T_camera_world;       ///< empty unless state is kTracking or kPredicted
   std::vector<LandmarkId> landmarks;       ///< landmark each point shows, or none; inliers only
+  double pixel_error_scale = 0.0;          ///< as OptimisedPose
   int inliers = 0;                         ///< landmarks that agree with the pose
   int visible = 0;                         ///< landmarks that the pose puts into view unoccluded
   Matrix6d covariance = Matrix6d::Zero();  ///< of the pose, as OptimisedPose::covariance

@@ -310,6 +310,7 @@ void Tracker::refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate
                      settings_.pose, frame.landmarks);
   frame.T_camera_world = pose.T_camera_world;
   frame.covariance = pose.covariance;
+  frame.pixel_error_scale = pose.pixel_error_scale;
   frame.inliers = pose.inliers;
   times_.optimise += watch.seconds();
 }
