@@ -40,10 +40,12 @@ struct ROSLAM_EXPORT FrameResult {
   RejectReason rejected = RejectReason::kNone;  ///< if not kNone, nothing below but state is set
   TrackingState state = TrackingState::kInitialising;
   std::optional<SE3>
-      T_world_camera;    ///< as estimated now; later corrections of the map are in Slam::trajectory()
-  SubmapId submap;       ///< that the pose is in; submaps that overlap are merged later
-  int inliers = 0;       ///< landmarks that support the pose
-  double quality = 0.0;  ///< tracking quality, 0 (predicted or unknown) to 1
+      T_world_camera;  ///< as estimated now; later corrections of the map are in Slam::trajectory()
+  Matrix6d covariance = Matrix6d::Zero();  ///< of T_world_camera: (position m, rotation vector rad) in the
+                                           ///< world frame, against the origin of the submap
+  SubmapId submap;                         ///< that the pose is in; submaps that overlap are merged later
+  int inliers = 0;                         ///< landmarks that support the pose
+  double quality = 0.0;                    ///< tracking quality, 0 (predicted or unknown) to 1
   bool is_keyframe = false;
   std::vector<std::string> warnings;        ///< what is newly doubtful about the input, with the remedy
   bool is_clock_reset = false;              ///< the source's clock was found to have restarted at this frame

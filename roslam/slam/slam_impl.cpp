@@ -100,7 +100,10 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   result.inliers = tracked.inliers;
   result.quality = tracked.quality;
   result.is_keyframe = keyframe.is_valid();
-  if (tracked.T_camera_world) result.T_world_camera = tracked.T_camera_world->inverse();
+  if (tracked.T_camera_world) {
+    result.T_world_camera = tracked.T_camera_world->inverse();
+    result.covariance = covariance_in_world(*result.T_world_camera, tracked.covariance);
+  }
   result.points = std::move(observation.points);
   result.removed_points = std::move(observation.removed_points);
   if (keyframe.is_valid()) submit(keyframe, frame, result.dynamic_objects);

@@ -17,12 +17,13 @@ struct TrackedFrame {
   TrackingState state = TrackingState::kInitialising;
   double timestamp = 0.0;  ///< seconds
   std::shared_ptr<const ObservedFrame> view;
-  std::optional<SE3> T_camera_world;       ///< empty unless state is kTracking or kPredicted
-  std::vector<LandmarkId> landmarks;       ///< landmark each point shows, or none; inliers only
-  double pixel_error_scale = 0.0;          ///< as OptimisedPose
-  int inliers = 0;                         ///< landmarks that agree with the pose
-  int visible = 0;                         ///< landmarks that the pose puts into view unoccluded
-  Matrix6d covariance = Matrix6d::Zero();  ///< of the pose, as OptimisedPose::covariance
+  std::optional<SE3> T_camera_world;                   ///< empty unless state is kTracking or kPredicted
+  std::vector<LandmarkId> landmarks;                   ///< landmark each point shows, or none; inliers only
+  double pixel_error_scale = 0.0;                      ///< as OptimisedPose
+  int inliers = 0;                                     ///< landmarks that agree with the pose
+  int visible = 0;                                     ///< landmarks that the pose puts into view unoccluded
+  Matrix6d measurement_covariance = Matrix6d::Zero();  ///< of the pose in the local map, as OptimisedPose
+  Matrix6d covariance = Matrix6d::Zero();  ///< of the pose in its submap, likewise; see PoseCovariance
   double quality = 0.0;  ///< 0 (predicted or unknown) to 1 (trusted_inliers or more inliers)
   int hidden = 0;        ///< landmarks of the reference that removed objects hide
   KeyframeId reference;  ///< shares most landmarks; none for the first frame of a submap

@@ -101,6 +101,8 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     relocaliser_.restart();
     frame.quality = std::min(1.0, frame.inliers / static_cast<double>(settings_.tracker.trusted_inliers));
     count_found(frame);
+    frame.covariance =
+        covariance_.of_frame(map_, *frame.T_camera_world, frame.landmarks, frame.measurement_covariance);
     remember(frame);
   } else if (was_known && predict_hidden(frame, hint)) {
     state_ = TrackingState::kPredicted;
@@ -113,7 +115,8 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
                                                                     : TrackingState::kLost;
     velocity_.reset();
     frame.T_camera_world.reset();
-    frame.inliers = 0;
+    frame.inliers = frame.visible = 0;
+    frame.covariance.setZero();
     frame.landmarks.assign(frame.view->size(), {});
   }
   frame.state = state_;
@@ -202,10 +205,10 @@ PoseDoubt Tracker::doubt_of(const TrackedFrame& frame, int min_inliers) const {
   const bool is_same_submap =
       last_.reference.is_valid() && map_.submap_of(last_.reference) == map_.submap_of(frame.reference);
   if (!is_same_submap) return PoseDoubt::kNone;
-  MotionState last{last_.timestamp, last_pose()->inverse(), position_sigma(last_.covariance), {}};
+  MotionState last{last_.timestamp, last_pose()->inverse(), position_sigma(last_.measurement_covariance), {}};
   if (velocity_) last.velocity = -(last.T_world_camera.rotation() * velocity_->head<3>());
   return check_motion(last, frame.timestamp, frame.T_camera_world->inverse(),
-                      position_sigma(frame.covariance), settings_.plausible);
+                      position_sigma(frame.measurement_covariance), settings_.plausible);
 }
 
 bool Tracker::is_accepted(const TrackedFrame& frame, int min_inliers) {
@@ -309,7 +312,7 @@ void Tracker::refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate
       optimise_frame(camera_, map_, *frame.view, points, positions, *frame.T_camera_world, settings_.noise,
                      settings_.pose, frame.landmarks);
   frame.T_camera_world = pose.T_camera_world;
-  frame.covariance = pose.covariance;
+  frame.measurement_covariance = pose.covariance;
   frame.pixel_error_scale = pose.pixel_error_scale;
   frame.inliers = pose.inliers;
   times_.optimise += watch.seconds();
@@ -320,6 +323,8 @@ bool Tracker::predict_hidden(TrackedFrame& frame, const FrameHint& hint) {
   const bool is_hidden = hint.hidden_share >= settings_.tracker.hidden_share;
   if (!is_hidden || frame.timestamp - last_.timestamp > settings_.tracker.max_predicted) return false;
   frame.T_camera_world = predict_pose(frame.timestamp);
+  frame.covariance = PoseCovariance::of_prediction(
+      last_.covariance, *frame.T_camera_world * last_pose()->inverse(), frame.timestamp - last_.timestamp);
   frame.reference = last_.reference;
   frame.inliers = 0;
   frame.landmarks.assign(frame.view->size(), {});
@@ -365,6 +370,7 @@ void Tracker::remember(const TrackedFrame& frame) {
 
 void Tracker::keyframe_created(KeyframeId id) {
   const Keyframe& keyframe = *map_.find(id);
+  covariance_.add_keyframe(id, last_.covariance);
   last_.reference = id;
   last_.landmarks = keyframe.landmarks;
   T_last_reference_ = SE3();

@@ -20,6 +20,7 @@
 #include "roslam/tracking/initial_pose.hpp"
 #include "roslam/tracking/local_map.hpp"
 #include "roslam/tracking/pose_check.hpp"
+#include "roslam/tracking/pose_covariance.hpp"
 #include "roslam/tracking/relocaliser.hpp"
 #include "roslam/tracking/tracked_frame.hpp"
 #include "roslam/tracking/tracking_options.hpp"
@@ -114,6 +115,7 @@ class Tracker {
   InitialPoseEstimator initial_pose_;
   LocalMap local_map_;
   Relocaliser relocaliser_;
+  PoseCovariance covariance_;
 
   TrackingState state_ = TrackingState::kInitialising;
   TrackedFrame last_;                  // the last frame with a pose
