@@ -115,6 +115,11 @@ SE3 Flight::T_world_camera(double time) const {
   const auto channel = [&](std::uint32_t i, double slowest) {
     return options_.sway * waver(time, slowest, mix(options_.seed, 0xf11U, i));
   };
+  // Gusts are faster: half a turn of the sum of sines lasts a second or two.
+  const auto gust = [&](std::uint32_t i) {
+    constexpr double kSlowest = 0.25;  // Hz
+    return options_.gusts * waver(time, kSlowest, mix(options_.seed, 0x9057U, i));
+  };
   Waypoint waypoint = at(options_.speed * time);
   double drift = 0.03;
   if (options_.path == FlightPath::kHover) {
@@ -124,12 +129,12 @@ SE3 Flight::T_world_camera(double time) const {
   const Vector2d along = direction(waypoint.heading);
   const Vector2d left(-along.y(), along.x());
   const Vector2d position = waypoint.position + drift * channel(0, 0.05) * along +
-                            ((drift + 0.02) * channel(1, 0.07) + options_.aside) * left;
-  const double height = options_.altitude + 0.04 * channel(2, 0.09);
+                            ((drift + 0.02) * channel(1, 0.07) + 0.25 * gust(0) + options_.aside) * left;
+  const double height = options_.altitude + 0.04 * channel(2, 0.09) + 0.12 * gust(1);
   const double degree = kPi / 180.0;
-  const double yaw = waypoint.heading + 1.0 * degree * channel(3, 0.11);
-  const double pitch = options_.pitch_down + 0.9 * degree * channel(4, 0.15);
-  const double roll = 0.9 * degree * channel(5, 0.13);
+  const double yaw = waypoint.heading + 1.0 * degree * channel(3, 0.11) + 25.0 * degree * gust(2);
+  const double pitch = options_.pitch_down + 0.9 * degree * channel(4, 0.15) + 4.0 * degree * gust(3);
+  const double roll = 0.9 * degree * channel(5, 0.13) + 6.0 * degree * gust(4);
   Eigen::Matrix3d R_body_camera;
   R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const Eigen::Matrix3d R_world_body =

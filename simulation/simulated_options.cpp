@@ -43,6 +43,7 @@ void SimulatorOptions::validate() const {
   check("speed", speed, 0.01, 30);
   check("altitude", altitude, 2.2, 30);  // above people and cars
   check("aside", aside, -3, 3);          // between the houses
+  check("gusts", gusts, 0, 3);
   check("gain", gain, 0.1, 10);
   check("pitch_down", pitch_down, -0.8, 1.58);
   check("sway", sway, 0, 5);

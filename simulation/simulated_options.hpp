@@ -38,6 +38,7 @@ struct SimulatorOptions {
   double aside = 0.0;         ///< lateral offset of the path, metres to the left
   double pitch_down = 0.26;   ///< of the camera below the horizon, radians
   double sway = 1.0;          ///< of the drone; 1 is a few centimetres and about a degree, 0 none
+  double gusts = 0.0;         ///< of wind; 1 turns the drone at up to 60 degrees a second, 0 is calm air
   double gain = 1.0;          ///< factor on the images' brightness, as under other lighting
   double colour_noise = 1.5;  ///< standard deviation, grey levels
 

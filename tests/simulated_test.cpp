@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
@@ -389,6 +390,29 @@ TEST_F(SimulateCommand, TellsWrongUsageFromWrongOutput) {
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_NE(lines[0].find("/dev/null/flight"), std::string::npos) << lines[0];
   fs::remove(out_.string() + ".err");
+}
+
+// The largest turn rate of a flight, degrees a second.
+double largest_turn_rate(double gusts, std::uint32_t seed) {
+  SimulatorOptions options;
+  options.gusts = gusts;
+  options.seed = seed;
+  options.traffic = TrafficLevel::kNone;
+  const Simulator simulator(options);
+  double largest = 0.0;
+  for (std::size_t i = 1; i < simulator.size(); ++i) {
+    const SE3 turn = simulator.T_world_camera(i - 1).inverse() * simulator.T_world_camera(i);
+    largest = std::max(largest, turn.angle() * options.fps * 180.0 / std::numbers::pi);
+  }
+  return largest;
+}
+
+TEST(SimulatedGusts, TurnTheDroneAtUpToSixtyDegreesASecond) {
+  for (const std::uint32_t seed : {1U, 2U, 3U}) {
+    EXPECT_LT(largest_turn_rate(0.0, seed), 5.0);
+    EXPECT_GT(largest_turn_rate(1.0, seed), 40.0);
+    EXPECT_LT(largest_turn_rate(1.0, seed), 70.0);
+  }
 }
 
 }  // namespace

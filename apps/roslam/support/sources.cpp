@@ -28,6 +28,8 @@ void for_each_flight_option(Arguments& arguments, const Visitor& visit) {
   visit("speed", arguments.speed);
   visit("altitude", arguments.altitude);
   visit("aside", arguments.aside);
+  visit("fps", arguments.fps);
+  visit("gusts", arguments.gusts);
   visit("gain", arguments.gain);
 }
 }  // namespace
@@ -70,6 +72,11 @@ void add_flight_options(CLI::App& command, SourceArguments& arguments) {
       .add_option("--aside", arguments.aside,
                   "Offset of a simulated flight to the left of the default path, metres")
       ->capture_default_str();
+  command.add_option("--fps", arguments.fps, "Frames a second of a simulated flight")->capture_default_str();
+  command
+      .add_option("--gusts", arguments.gusts,
+                  "Gusts of wind of a simulated flight: 0 calm air, 1 turns the drone at up to 60 degrees/s")
+      ->capture_default_str();
   command.add_option("--gain", arguments.gain, "Factor of the image brightness of a simulated flight")
       ->capture_default_str();
 }
@@ -93,6 +100,8 @@ std::optional<SimulatorOptions> simulated_flight(const SourceArguments& argument
   options.speed = arguments.speed;
   options.altitude = arguments.altitude;
   options.aside = arguments.aside;
+  options.fps = arguments.fps;
+  options.gusts = arguments.gusts;
   options.gain = arguments.gain;
   return options;
 }

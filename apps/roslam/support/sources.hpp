@@ -24,6 +24,8 @@ struct SourceArguments {
   double speed = 1.0;            ///< m/s
   double altitude = 3.5;         ///< metres above the street
   double aside = 0.0;            ///< metres to the left of the default path
+  double fps = 30.0;             ///< frames a second
+  double gusts = 0.0;            ///< of wind; 1 turns the drone at up to 60 degrees a second
   double gain = 1.0;             ///< factor of the image brightness
   std::string degrade = "none";  ///< a name of simulation::degradation_names(), of any source
 };
