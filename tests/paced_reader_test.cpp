@@ -156,7 +156,7 @@ TEST(PacedReader, ThePaceIsKeptAfterATimeThatIsNotFinite) {
 }
 
 TEST(PacedReader, ASlowConsumerGetsFramesSpreadOverTheStallAndTheOthersAreCounted) {
-  FakeSource source(every(0.001, 20));
+  FakeSource source(every(0.01, 20));
   PacedReader reader(source, 3);
   ASSERT_TRUE(source.wait_for_end());
   EXPECT_EQ(indices_of_rest(reader), (std::vector<std::size_t>{0, 4, 8, 12, 14, 16, 18, 19}));

@@ -76,6 +76,8 @@ TEST(PoseCheck, OptionsNameWhatIsOutOfRange) {
     return std::string();
   };
   EXPECT_NE(refused([](auto& o) { o.min_found_share = 1.0; }).find("min_found_share"), std::string::npos);
+  EXPECT_NE(refused([](auto& o) { o.poor_found_share = -0.1; }).find("poor_found"), std::string::npos);
+  EXPECT_NE(refused([](auto& o) { o.max_pixel_error = 0.0; }).find("max_pixel"), std::string::npos);
   EXPECT_NE(refused([](auto& o) { o.max_speed = 0.0; }).find("max_speed"), std::string::npos);
   EXPECT_NE(refused([](auto& o) { o.max_acceleration = std::nan(""); }).find("max_acc"), std::string::npos);
   EXPECT_NE(refused([](auto& o) { o.max_turn_rate = -1.0; }).find("max_turn_rate"), std::string::npos);

@@ -2,8 +2,10 @@
 // Images without features, missing or absurd depth: tracking reports loss and recovers.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <memory>
+#include <opencv2/imgproc.hpp>
 #include <ostream>
 
 #include "roslam/common/error.hpp"
@@ -62,6 +64,51 @@ INSTANTIATE_TEST_SUITE_P(
                     Blank{"grey10", cv::Scalar::all(128), 10}, Blank{"black60", cv::Scalar::all(0), 60},
                     Blank{"white60", cv::Scalar::all(255), 60}, Blank{"grey60", cv::Scalar::all(128), 60}),
     [](const auto& tested) { return std::string(tested.param.name); });
+
+// As an image taken while the camera shakes: rows are displaced against each other, and blurred.
+cv::Mat shaken(const cv::Mat& image, double pixels) {
+  cv::Mat columns(image.size(), CV_32FC1), rows(image.size(), CV_32FC1), result;
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      columns.at<float>(y, x) = static_cast<float>(x + pixels * std::sin(0.05 * y));
+      rows.at<float>(y, x) = static_cast<float>(y + pixels * std::cos(0.04 * y));
+    }
+  }
+  cv::remap(image, result, columns, rows, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  cv::GaussianBlur(result, result, {}, 2.5);
+  return result;
+}
+
+TEST_F(Street, APoseThatAShakenImageGivesIsNotGivenOut) {
+  constexpr std::size_t kShaken = 40;
+  Options options;
+  options.dynamic_objects = *options_of_mode("none", options.dynamic_objects);
+  Slam slam(*camera_preset("simulated"), options);
+  std::optional<SE3> first;
+  for (const Frame& given : *frames_) {
+    if (given.index > kShaken + 5) break;
+    Frame frame = given;
+    if (frame.index == kShaken) frame.colour = shaken(frame.colour, 4.0);
+    const auto result = slam.process(frame);
+    if (frame.index == kShaken) {
+      EXPECT_EQ(result.state, TrackingState::kRecentlyLost);
+      EXPECT_FALSE(result.T_world_camera);
+      EXPECT_EQ(result.inliers, 0);
+      EXPECT_FALSE(result.is_keyframe);
+      EXPECT_TRUE(result.covariance.isZero());
+      continue;
+    }
+    ASSERT_EQ(result.state, TrackingState::kTracking) << frame.index;
+    if (!first) first = result.T_world_camera;
+    const SE3 error = truth(frame, *first).inverse() * *result.T_world_camera;
+    EXPECT_LT(error.translation().norm(), 0.05) << frame.index;
+    EXPECT_LT(error.angle(), 0.01) << frame.index;
+  }
+  slam.finish();
+  EXPECT_EQ(slam.doubted_poses().size(), 1U);
+  EXPECT_EQ(slam.doubted_poses()["few of the landmarks in view are found, and not well"], 1U);
+  EXPECT_EQ(slam.trajectory().size(), kShaken + 5) << "the shaken frame has no pose";
+}
 
 TEST_F(Street, TrackingGoesOnWhileDepthIsMissing) {
   Slam slam(*camera_preset("simulated"));

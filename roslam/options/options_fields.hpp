@@ -74,6 +74,8 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("tracker", "recently_lost_frames", o.tracker.recently_lost_frames);
   visit("tracker", "new_submap_after_lost", o.tracker.new_submap_after_lost);
   visit("plausible", "min_found_share", o.plausible.min_found_share);
+  visit("plausible", "poor_found_share", o.plausible.poor_found_share);
+  visit("plausible", "max_pixel_error", o.plausible.max_pixel_error);
   visit("plausible", "max_speed", o.plausible.max_speed);
   visit("plausible", "max_acceleration", o.plausible.max_acceleration);
   visit("plausible", "max_turn_rate", o.plausible.max_turn_rate);

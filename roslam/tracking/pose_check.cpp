@@ -12,6 +12,9 @@ namespace roslam {
 void PlausibilityOptions::validate() const {
   if (!(min_found_share >= 0.0 && min_found_share < 1.0))
     throw OptionsError("plausible.min_found_share must be 0 to 1");
+  if (!(poor_found_share >= 0.0 && poor_found_share <= 1.0))
+    throw OptionsError("plausible.poor_found_share must be 0 to 1");
+  if (!(max_pixel_error > 0.0)) throw OptionsError("plausible.max_pixel_error must be positive (sigmas)");
   if (!(max_speed > 0.0)) throw OptionsError("plausible.max_speed must be positive (m/s)");
   if (!(max_acceleration > 0.0)) throw OptionsError("plausible.max_acceleration must be positive (m/s^2)");
   if (!(max_turn_rate > 0.0)) throw OptionsError("plausible.max_turn_rate must be positive (degrees/s)");
@@ -25,6 +28,8 @@ std::string_view describe(PoseDoubt doubt) {
       return "too few landmarks agree";
     case PoseDoubt::kFewFound:
       return "too few of the landmarks in view are found";
+    case PoseDoubt::kPoorFit:
+      return "few of the landmarks in view are found, and not well";
     case PoseDoubt::kSpeed:
       return "the speed is not plausible";
     case PoseDoubt::kAcceleration:

@@ -15,6 +15,7 @@ enum class PoseDoubt {
   kNone,          ///< it is
   kFewInliers,    ///< too few landmarks agree
   kFewFound,      ///< too few of the landmarks that the pose puts into view are found
+  kPoorFit,       ///< few of them are found, and the matches are off by much, as in a blurred image
   kSpeed,         ///< the camera would have moved faster than plausible.max_speed
   kAcceleration,  ///< its velocity would have changed faster than plausible.max_acceleration
   kTurnRate       ///< it would have turned faster than plausible.max_turn_rate

@@ -104,6 +104,12 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     frame.covariance =
         covariance_.of_frame(map_, *frame.T_camera_world, frame.landmarks, frame.measurement_covariance);
     remember(frame);
+    // Where it lasts, it is the map that is poor.
+    constexpr double kLongest = 0.3;  // seconds
+    if (!is_poor_fit(frame))
+      last_fit_ = frame.timestamp;
+    else if (last_fit_ && frame.timestamp - *last_fit_ <= kLongest)
+      withhold(frame);
   } else if (was_known && predict_hidden(frame, hint)) {
     state_ = TrackingState::kPredicted;
   } else if (const bool could_start = can_start(frame, hint);
@@ -119,8 +125,25 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     frame.covariance.setZero();
     frame.landmarks.assign(frame.view->size(), {});
   }
-  frame.state = state_;
+  if (frame.T_camera_world || !found) frame.state = state_;
   return frame;
+}
+
+bool Tracker::is_poor_fit(const TrackedFrame& frame) const {
+  return frame.pixel_error_scale > settings_.plausible.max_pixel_error &&
+         frame.inliers < settings_.plausible.poor_found_share * frame.visible;
+}
+
+// The pose is good enough to find the next frame from it, not to be given out: such poses are off by
+// centimetres.
+void Tracker::withhold(TrackedFrame& frame) {
+  ++doubts_[PoseDoubt::kPoorFit];
+  frame.state = TrackingState::kRecentlyLost;
+  frame.T_camera_world.reset();
+  frame.covariance.setZero();
+  frame.inliers = 0;
+  frame.quality = 0.0;
+  frame.landmarks.assign(frame.view->size(), {});
 }
 
 bool Tracker::can_start(const TrackedFrame& frame, const FrameHint& hint) {
@@ -379,6 +402,7 @@ void Tracker::keyframe_created(KeyframeId id) {
 void Tracker::restart_clock(double timestamp) {
   velocity_.reset();
   waits_since_.reset();
+  last_fit_.reset();
   last_.timestamp = timestamp;
 }
 

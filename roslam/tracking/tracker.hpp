@@ -91,6 +91,8 @@ class Tracker {
   const Times& times() const { return times_; }
 
  private:
+  bool is_poor_fit(const TrackedFrame& frame) const;
+  void withhold(TrackedFrame& frame);
   bool can_start(const TrackedFrame& frame, const FrameHint& hint);
   TrackedFrame initialise(TrackedFrame frame);
   bool follow(TrackedFrame& frame, const FrameHint& hint);
@@ -122,6 +124,7 @@ class Tracker {
   SE3 T_last_reference_;               // its pose in its reference keyframe, which bundle adjustment may move
   std::optional<Vector6d> velocity_;   // twist of T_current_last, per second; none: unknown
   std::optional<double> waits_since_;  // seconds; to start a map, for a view that movable objects do not fill
+  std::optional<double> last_fit_;     // seconds, of the last frame that was not a poor fit
   int frames_lost_ = 0;
   int frames_unrecognised_ = 0;  // of these, frames with enough points to start a submap
   std::map<PoseDoubt, std::size_t> doubts_;

@@ -28,6 +28,8 @@ struct ROSLAM_EXPORT TrackerOptions {
 /// an agile drone; a vehicle that moves less is guarded better by smaller ones.
 struct ROSLAM_EXPORT PlausibilityOptions {
   double min_found_share = 0.05;   ///< of the landmarks that the pose puts into view unoccluded
+  double poor_found_share = 0.16;  ///< the same, where matches are off by more than max_pixel_error
+  double max_pixel_error = 1.7;    ///< sigmas, as estimated so far; more are those of blurred images
   double max_speed = 20.0;         ///< m/s
   double max_acceleration = 30.0;  ///< m/s^2, change of velocity between two frames
   double max_turn_rate = 720.0;    ///< degrees/s
