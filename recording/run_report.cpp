@@ -55,7 +55,6 @@ Json counts_json(const std::map<std::string, std::size_t>& counts) {
   return json;
 }
 
-// in_source = processed + dropped + all skipped, unless the run ended early.
 Json noise_json(const MeasurementNoise& noise) {
   return {{"estimated", noise.estimate},
           {"pixel_sigma", rounded(noise.pixel_sigma, 2)},
@@ -63,6 +62,7 @@ Json noise_json(const MeasurementNoise& noise) {
           {"depth_growth_per_m", rounded(noise.depth_sigma_growth, 5)}};
 }
 
+// in_source = processed + dropped + all skipped, unless the run ended early.
 Json frames_json(const Slam& slam, const RunResults& summary, const FrameSource& source) {
   std::size_t tracked = 0;
   Json by_state = Json::object();

@@ -208,8 +208,8 @@ void restore(RestoreArguments arguments, const std::string& version) {
 
 // Options of the source are recorded in the run and must not contradict it.
 void require_no_flight_options(const CLI::App& command) {
-  for (const char* name :
-       {"--camera", "--traffic", "--frames", "--seed", "--speed", "--altitude", "--aside", "--fps", "--gusts", "--gain"})
+  for (const char* name : {"--camera", "--traffic", "--frames", "--seed", "--speed", "--altitude", "--aside",
+                           "--fps", "--gusts", "--gain"})
     if (command.count(name) > 0) throw CLI::ValidationError(name, "is known from the run; leave it out");
 }
 }  // namespace

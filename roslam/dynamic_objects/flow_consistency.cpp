@@ -78,7 +78,7 @@ std::optional<SE3> FlowConsistency::camera_pose(const PastFrame& last, const Pas
     PoseMeasurement m;
     m.point_world = T_world_last * camera_.unproject(from->undistorted, depth);
     m.measurement =
-        Measurement::make(to->undistorted.cast<float>(), now, 1.0F, noise_.known_of({}, depth_noise_));
+        Measurement::make(to->undistorted.cast<float>(), now, 1.0F, noise_);
     measurements.push_back(m);
   }
   if (static_cast<int>(measurements.size()) < kMinPosePoints) return std::nullopt;
@@ -93,7 +93,7 @@ std::optional<SE3> FlowConsistency::camera_pose(const PastFrame& last, const Pas
 double FlowConsistency::residual(const Eigen::Vector2d& from, float depth, const Eigen::Vector2d& to,
                                  const SE3& T_current_past, double pixel_sigma) const {
   if (depth > 0.0F) {
-    const double sigma = depth_noise_.sigma(depth);
+    const double sigma = noise_.sigma_of_depth(depth);
     const Eigen::Vector3d here = T_current_past * camera_.unproject(from, depth);
     const Eigen::Vector3d farther = T_current_past * camera_.unproject(from, depth + sigma);
     if (here.z() < 0.05 || farther.z() < 0.05) return 0.0;
@@ -121,7 +121,7 @@ bool FlowConsistency::is_covered(const Corner& from, float depth, const Corner& 
   if (depth <= 0.0F || depth_image.empty()) return false;
   const double now = depth_at(depth_image, to.pixel, depth_);
   const double z = (T_current_past * camera_.unproject(from.undistorted, depth)).z();
-  const double sigma = std::hypot(depth_noise_.sigma(depth), depth_noise_.sigma(now));
+  const double sigma = std::hypot(noise_.sigma_of_depth(depth), noise_.sigma_of_depth(now));
   return now > 0.0 && now < z - 3.0 * sigma - options_.depth_tolerance * z;
 }
 

@@ -26,14 +26,9 @@ class FlowConsistency {
  public:
   FlowConsistency(const Camera& camera, const DynamicObjectOptions& options, const DepthOptions& depth,
                   const MeasurementNoise& noise, const PoseOptimiserOptions& pose)
-      : camera_(camera),
-        options_(options),
-        depth_(depth),
-        noise_(noise),
-        depth_noise_(noise.depth_noise()),
-        pose_(pose) {}
+      : camera_(camera), options_(options), depth_(depth), noise_(noise), pose_(pose) {}
 
-  void set_depth_noise(const DepthNoise& noise) { depth_noise_ = noise; }
+  void set_depth_noise(const DepthNoise& noise) { noise_ = noise_.known_of({}, noise); }
 
   /// Tracks the corners of the last frame to the current one, whose pose is a prediction or unknown. Sets its
   /// corners, and returns its T_camera_world by those that were outside the mask; nothing if no pose is
@@ -66,7 +61,6 @@ class FlowConsistency {
   DynamicObjectOptions options_;
   DepthOptions depth_;
   MeasurementNoise noise_;
-  DepthNoise depth_noise_;
   PoseOptimiserOptions pose_;
 };
 

@@ -104,12 +104,6 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     frame.covariance =
         covariance_.of_frame(map_, *frame.T_camera_world, frame.landmarks, frame.measurement_covariance);
     remember(frame);
-    // Where it lasts, it is the map that is poor.
-    constexpr double kLongest = 0.3;  // seconds
-    if (!is_poor_fit(frame))
-      last_fit_ = frame.timestamp;
-    else if (last_fit_ && frame.timestamp - *last_fit_ <= kLongest)
-      withhold(frame);
   } else if (was_known && predict_hidden(frame, hint)) {
     state_ = TrackingState::kPredicted;
   } else if (const bool could_start = can_start(frame, hint);
@@ -120,30 +114,34 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     state_ = frames_lost_ <= settings_.tracker.recently_lost_frames ? TrackingState::kRecentlyLost
                                                                     : TrackingState::kLost;
     velocity_.reset();
-    frame.T_camera_world.reset();
-    frame.inliers = frame.visible = 0;
-    frame.covariance.setZero();
-    frame.landmarks.assign(frame.view->size(), {});
+    drop_pose(frame);
   }
-  if (frame.T_camera_world || !found) frame.state = state_;
+  frame.state = state_;
+  if (found) withhold_poor_fit(frame);
   return frame;
 }
 
-bool Tracker::is_poor_fit(const TrackedFrame& frame) const {
-  return frame.pixel_error_scale > settings_.plausible.max_pixel_error &&
-         frame.inliers < settings_.plausible.poor_found_share * frame.visible;
-}
-
-// The pose is good enough to find the next frame from it, not to be given out: such poses are off by
-// centimetres.
-void Tracker::withhold(TrackedFrame& frame) {
-  ++doubts_[PoseDoubt::kPoorFit];
-  frame.state = TrackingState::kRecentlyLost;
+void Tracker::drop_pose(TrackedFrame& frame) {
   frame.T_camera_world.reset();
   frame.covariance.setZero();
-  frame.inliers = 0;
+  frame.inliers = frame.visible = 0;
   frame.quality = 0.0;
   frame.landmarks.assign(frame.view->size(), {});
+}
+
+// A pose of poor fit is good enough to find the next frame from it, not to be given out: it is off by
+// centimetres. Where that lasts, it is the map that is poor.
+void Tracker::withhold_poor_fit(TrackedFrame& frame) {
+  constexpr double kLongest = 0.3;  // seconds
+  const bool is_poor = frame.pixel_error_scale > settings_.plausible.max_pixel_error &&
+                       frame.inliers < settings_.plausible.poor_found_share * frame.visible;
+  if (!is_poor) {
+    last_fit_ = frame.timestamp;
+  } else if (last_fit_ && frame.timestamp - *last_fit_ <= kLongest) {
+    ++doubts_[PoseDoubt::kPoorFit];
+    frame.state = TrackingState::kRecentlyLost;
+    drop_pose(frame);
+  }
 }
 
 bool Tracker::can_start(const TrackedFrame& frame, const FrameHint& hint) {

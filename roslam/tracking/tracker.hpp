@@ -91,8 +91,8 @@ class Tracker {
   const Times& times() const { return times_; }
 
  private:
-  bool is_poor_fit(const TrackedFrame& frame) const;
-  void withhold(TrackedFrame& frame);
+  static void drop_pose(TrackedFrame& frame);
+  void withhold_poor_fit(TrackedFrame& frame);
   bool can_start(const TrackedFrame& frame, const FrameHint& hint);
   TrackedFrame initialise(TrackedFrame frame);
   bool follow(TrackedFrame& frame, const FrameHint& hint);
