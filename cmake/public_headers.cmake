@@ -8,10 +8,12 @@ set(ROSLAM_PUBLIC_HEADERS
   geometry/alignment.hpp
   geometry/camera.hpp
   geometry/depth_noise.hpp
+  geometry/imu_calibration.hpp
   geometry/se3.hpp
   geometry/trajectory.hpp
   sensors/frame_source.hpp
   sensors/image_file.hpp
+  sensors/inertial_sample.hpp
   sensors/timed_files.hpp
   sensors/tum_source.hpp
   features/descriptor.hpp

@@ -62,6 +62,17 @@ Json noise_json(const MeasurementNoise& noise) {
           {"depth_growth_per_m", rounded(noise.depth_sigma_growth, 5)}};
 }
 
+Json gyroscope_json(const GyroscopeState& state) {
+  const auto values = [](const Eigen::Vector3d& v) {
+    return Json::array({rounded(v.x(), 5), rounded(v.y(), 5), rounded(v.z(), 5)});
+  };
+  return {{"agrees", state.agrees},
+          {"bias_rad_per_s", values(state.bias)},
+          {"bias_sigma_rad_per_s", values(state.bias_sigma)},
+          {"samples", state.samples},
+          {"skipped", state.skipped}};
+}
+
 // in_source = processed + dropped + all skipped, unless the run ended early.
 Json frames_json(const Slam& slam, const RunResults& summary, const FrameSource& source) {
   std::size_t tracked = 0;
@@ -82,6 +93,7 @@ Json frames_json(const Slam& slam, const RunResults& summary, const FrameSource&
           {"dropped_in_a_row", summary.longest_gap},
           {"by_state", by_state},
           {"skipped", counts_json(counts.skipped)},
+          {"withdrawn_poses", slam.withdrawn_poses()},
           {"doubted_poses", counts_json(slam.doubted_poses())},
           {"clock_resets", slam.clock_resets()},
           {"without_depth", summary.without_depth},
@@ -242,6 +254,7 @@ std::string run_report(const Slam& slam, const RunResults& summary, const FrameS
   json["gave_way"] = counts_json(slam.gave_way());
   json["warnings"] = counts_json(slam.warnings());
   json["noise"] = noise_json(slam.measurement_noise());
+  if (const auto gyroscope = slam.gyroscope()) json["gyroscope"] = gyroscope_json(*gyroscope);
   json["dynamic"] = dynamic_json(slam, summary, description);
   if (slam.restores())
     json["restoration"] = {{"dropped", slam.unrestored()},

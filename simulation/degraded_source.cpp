@@ -91,8 +91,14 @@ bool DegradedSource::is_missing(const Frame& frame) {
 }
 
 std::optional<Frame> DegradedSource::next() {
+  std::vector<InertialSample> inertial;  // of missing frames
   while (auto frame = source_->next()) {
-    if (is_missing(*frame)) continue;
+    prepend_samples(std::move(inertial), frame->inertial);
+    inertial.clear();
+    if (is_missing(*frame)) {
+      inertial = std::move(frame->inertial);
+      continue;
+    }
     if (degradation_ == Degradation::kBlur) frame->colour = blurred(frame->colour, frame->index);
     if (degradation_ == Degradation::kExposure) frame->colour = exposed(frame->colour, frame->index);
     return frame;

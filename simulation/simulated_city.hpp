@@ -29,6 +29,7 @@ struct CityPlan {
 /// Line-of-sight test: which objects the houses occlude.
 class Sightlines {
  public:
+  Sightlines() = default;  ///< where nothing occludes
   explicit Sightlines(const CityPlan& plan);
 
   /// Whether houses occlude an object of that radius (metres) at `to` from a viewpoint at `from`.

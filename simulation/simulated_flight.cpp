@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "simulation/simulated_corridor.hpp"
 #include "simulation/simulated_noise.hpp"
 
 namespace roslam::simulation {
@@ -26,6 +27,16 @@ double ease(double t) { return t * t * t * (t * (6.0 * t - 15.0) + 10.0); }
 
 Vector2d direction(double heading) { return {std::cos(heading), std::sin(heading)}; }
 
+// How far a corner of 90 degrees, flown over that length, reaches along each of its streets.
+double reach_of_corner(double length) {
+  constexpr int kPieces = 1200;
+  double reach = 0.0;
+  for (int i = 0; i < kPieces; ++i) {
+    reach += std::cos(kPi / 2 * ease((i + 0.5) / kPieces)) * length / kPieces;
+  }
+  return reach;
+}
+
 // Slow sway: a sum of three sines of random phase, about 1 at most.
 double waver(double time, double slowest_hz, std::uint32_t seed) {
   double sum = 0.0;
@@ -41,13 +52,13 @@ double waver(double time, double slowest_hz, std::uint32_t seed) {
 }  // namespace
 
 Flight::Flight(const SimulatorOptions& options) : options_(options) {
-  const double quarter = kPi / 2;
-  // How far a corner reaches along each of its streets.
-  double reach = 0.0;
-  constexpr int kPieces = 1200;
-  for (int i = 0; i < kPieces; ++i) {
-    reach += std::cos(quarter * ease((i + 0.5) / kPieces)) * kCorner / kPieces;
+  if (options.path == FlightPath::kCorridor) {
+    options_.altitude = 1.5;
+    options_.aside = 0.0;
+    options_.pitch_down = 0.1;
   }
+  const double quarter = kPi / 2;
+  const double reach = reach_of_corner(kCorner);
   switch (options.path) {
     case FlightPath::kStreet:
       track_.push_back({{0, 0}, 0});
@@ -78,6 +89,14 @@ Flight::Flight(const SimulatorOptions& options) : options_(options) {
     case FlightPath::kHover:
       track_.push_back({{12, 0}, 0});
       break;
+    case FlightPath::kCorridor: {
+      constexpr double kNarrow = 2.5;  // metres of path over which its corner is flown
+      track_.push_back({{0, 0}, 0});
+      go(static_cast<double>(CorridorPlan().corner) - reach_of_corner(kNarrow), 0);
+      go(kNarrow, quarter);
+      go(12.0, 0);
+      break;
+    }
   }
   duration_ = options.path == FlightPath::kHover
                   ? 2 * 2 * kPi / kTurnRate

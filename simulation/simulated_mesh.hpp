@@ -44,6 +44,8 @@ enum class Material : std::uint8_t {
   kPaint,  ///< of a car body; texture coordinates are along and up the car
   kGlass,
   kCloth,
+  kTiles,    ///< all the same
+  kPlaster,  ///< smooth and nearly without texture
 };
 
 /// Appearance and ground truth shared by the triangles of one part of an object.

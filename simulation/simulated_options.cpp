@@ -22,6 +22,7 @@ std::optional<FlightPath> flight_path_from(std::string_view name) {
   if (name == "loop") return FlightPath::kLoop;
   if (name == "hover") return FlightPath::kHover;
   if (name == "turn") return FlightPath::kTurn;
+  if (name == "corridor") return FlightPath::kCorridor;
   return std::nullopt;
 }
 

@@ -10,10 +10,11 @@
 namespace roslam::simulation {
 
 enum class FlightPath {
-  kStreet,  ///< 50 m along a street
-  kLoop,    ///< around a block of houses, ending a few metres past the start
-  kHover,   ///< two full turns on the spot
-  kTurn,    ///< along a street, round a corner, along the next
+  kStreet,    ///< 50 m along a street
+  kLoop,      ///< around a block of houses, ending a few metres past the start
+  kHover,     ///< two full turns on the spot
+  kTurn,      ///< along a street, round a corner, along the next
+  kCorridor,  ///< along a corridor with white walls and repeated tiles, and round its corner
 };
 enum class TrafficLevel { kNone, kLight, kHeavy };
 enum class DepthModel {
@@ -34,11 +35,12 @@ struct SimulatorOptions {
   std::uint32_t seed = 1;     ///< of city, traffic, sway and noise
   double fps = 30.0;          ///< frames a second
   double speed = 1.0;         ///< of the flight, metres a second
-  double altitude = 3.5;      ///< of the camera above the street, metres
-  double aside = 0.0;         ///< lateral offset of the path, metres to the left
-  double pitch_down = 0.26;   ///< of the camera below the horizon, radians
+  double altitude = 3.5;      ///< of the camera above the street, metres; in the corridor it is 1.5
+  double aside = 0.0;         ///< lateral offset of the path, metres to the left; not in the corridor
+  double pitch_down = 0.26;   ///< of the camera below the horizon, radians; in the corridor it is 0.1
   double sway = 1.0;          ///< of the drone; 1 is a few centimetres and about a degree, 0 none
   double gusts = 0.0;         ///< of wind; 1 turns the drone at up to 60 degrees a second, 0 is calm air
+  bool imu = false;           ///< frames carry the samples of an inertial measurement unit
   double gain = 1.0;          ///< factor on the images' brightness, as under other lighting
   double colour_noise = 1.5;  ///< standard deviation, grey levels
 

@@ -78,6 +78,20 @@ Vector3f Painter::pavement(const Spot& spot) const {
   return litter(blend(Vector3f(0.3F, 0.28F, 0.25F) * (0.9F + 0.4F * grain(p, 0.6F, w)), stone, inside), p, w);
 }
 
+// Every tile has the same veins.
+Vector3f Painter::tiles(const Spot& spot) const {
+  constexpr float kTile = 0.4F;
+  const float w = spot.footprint;
+  const Vector2f q = spot.uv / kTile;
+  const Vector2f in(q.x() - simulation::floor(q.x()), q.y() - simulation::floor(q.y()));
+  const float joint = 0.012F;
+  const float inside =
+      span(in.x(), joint, 1.0F - joint, w / kTile) * span(in.y(), joint, 1.0F - joint, w / kTile);
+  const Vector2f veins = kTile * in + Vector2f(3.1F, 7.7F);
+  const float tone = 1.1F + 0.35F * grain(veins, 0.47F, w) + 0.15F * cracks_.sample(veins.x(), veins.y(), w);
+  return blend(Vector3f(0.55F, 0.54F, 0.5F), tone * Vector3f(1.0F, 0.98F, 0.93F), inside);
+}
+
 Vector3f Painter::sign(const Surface& surface, const Spot& spot) const {
   const Vector2f c = spot.uv - 0.5F * surface.size;
   const float half = 0.5F * surface.size.x();
@@ -168,6 +182,8 @@ Vector3f Painter::albedo(const Surface& surface, const Spot& spot) const {
       return road(spot);
     case Material::kPavement:
       return pavement(spot);
+    case Material::kTiles:
+      return tiles(spot);
     case Material::kFacade:
       return facade(surface, spot);
     case Material::kSign:
@@ -211,6 +227,8 @@ Vector3f Painter::albedo(const Surface& surface, const Spot& spot) const {
       const float tone = 1.0F + 0.5F * grain(uv, 0.5F, w) + 0.4F * mottle(uv, w, surface.seed);
       return litter(tone * Vector3f(0.27F, 0.38F, 0.14F), uv, w);
     }
+    case Material::kPlaster:
+      return surface.colour * (1.0F + 0.03F * mottle(uv, w, surface.seed));
     case Material::kPlain:
       return surface.colour * (1.0F + 0.12F * grain(uv, 0.9F, w));
   }

@@ -33,6 +33,7 @@ class Painter {
   Vector3f road(const Spot& spot) const;
   float marking(const Vector2f& p, float w) const;
   Vector3f pavement(const Spot& spot) const;
+  Vector3f tiles(const Spot& spot) const;
   Vector3f litter(const Vector3f& ground, const Vector2f& p, float w) const;
   Vector3f facade(const Surface& surface, const Spot& spot) const;
   Vector3f wall(const FacadePlan& plan, const Spot& spot, std::uint32_t seed) const;

@@ -64,9 +64,9 @@ struct Renderer::Hits {
   std::array<bool, kPacket> covered;  // ground below a movable object, which the sky does not light
 };
 
-Renderer::Renderer(const CityPlan& plan, const Camera& camera, std::uint32_t seed)
-    : camera_(camera), plan_(plan), city_(build_city(plan, seed)), painter_(plan_, seed) {
-  city_tracer_.build(city_, false);
+Renderer::Renderer(const CityPlan& plan, Mesh scene, const Camera& camera, std::uint32_t seed)
+    : camera_(camera), plan_(plan), scene_(std::move(scene)), painter_(plan_, seed) {
+  scene_tracer_.build(scene_, false);
   movables_tracer_.build(movables_, true);
 }
 
@@ -92,20 +92,20 @@ void Renderer::trace(const Eye& eye, const Points& points, bool movables, Hits& 
     rays.far[i] = 1e4F;
     rays.active[i] = static_cast<int>(i) < points.count ? -1 : 0;
   }
-  HitPacket city;
+  HitPacket fixed;
   HitPacket movable;
-  city_tracer_.intersect(rays, city);
+  scene_tracer_.intersect(rays, fixed);
   movable.triangle.fill(kMiss);
   if (movables) {
     for (std::size_t i = 0; i < kPacket; ++i) {
-      if (city.triangle[i] != kMiss) rays.far[i] = city.distance[i];
+      if (fixed.triangle[i] != kMiss) rays.far[i] = fixed.distance[i];
     }
     movables_tracer_.intersect(rays, movable);
   }
   for (std::size_t i = 0; i < static_cast<std::size_t>(points.count); ++i) {
     const bool moves = movable.triangle[i] != kMiss;
-    const HitPacket& hit = moves ? movable : city;
-    const Mesh& mesh = moves ? movables_ : city_;
+    const HitPacket& hit = moves ? movable : fixed;
+    const Mesh& mesh = moves ? movables_ : scene_;
     hits.touched[i] = moves;
     hits.sunlit[i] = false;
     hits.covered[i] = false;
@@ -153,7 +153,7 @@ void Renderer::light(const Eye& eye, bool movables, Hits& hits) const {
   };
   const Vector3f sun = sun_direction();
   if (aim(sun, 100.0F, [&](std::size_t i) { return hits.normal[i].dot(sun) > 0.0F; })) {
-    city_tracer_.block(rays);
+    scene_tracer_.block(rays);
     const auto open = rays.active;
     if (movables) movables_tracer_.block(rays);
     for (std::size_t i = 0; i < kPacket; ++i) {

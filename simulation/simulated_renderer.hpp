@@ -23,10 +23,11 @@ struct Image {
   cv::Mat touched;    ///< CV_8UC1, not 0 where a movable object is visible or casts a shadow
 };
 
-/// Ray tracer for the city and the movable objects in it.
+/// Ray tracer for a static scene and the movable objects in it.
 class Renderer {
  public:
-  Renderer(const CityPlan& plan, const Camera& camera, std::uint32_t seed);
+  /// plan: which the textures of a city follow.
+  Renderer(const CityPlan& plan, Mesh scene, const Camera& camera, std::uint32_t seed);
 
   /// Replaces the movable objects.
   void set_movables(Mesh movables);
@@ -64,10 +65,10 @@ class Renderer {
 
   Camera camera_;
   CityPlan plan_;
-  Mesh city_;
+  Mesh scene_;
   Mesh movables_;
   Painter painter_;
-  Tracer city_tracer_;
+  Tracer scene_tracer_;
   Tracer movables_tracer_;
 };
 

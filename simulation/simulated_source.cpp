@@ -8,7 +8,9 @@
 #include "roslam/common/error.hpp"
 #include "simulation/depth_noise.hpp"
 #include "simulation/simulated_city.hpp"
+#include "simulation/simulated_corridor.hpp"
 #include "simulation/simulated_flight.hpp"
+#include "simulation/simulated_imu.hpp"
 #include "simulation/simulated_noise.hpp"
 #include "simulation/simulated_renderer.hpp"
 #include "simulation/simulated_traffic.hpp"
@@ -21,6 +23,7 @@ using simulation::mix;
 Camera camera_for(const SimulatorOptions& options) {
   Camera camera = *camera_preset("simulated");
   camera.fps = options.fps;
+  if (options.imu) camera.imu = simulated_imu();
   return camera;
 }
 
@@ -54,8 +57,12 @@ struct Simulator::Impl {
       : options(given),
         camera(camera_for(given)),
         flight(given),
-        traffic(plan, given.traffic, given.seed),
-        renderer(plan, camera, given.seed) {
+        traffic(given.path == FlightPath::kCorridor ? Traffic(CorridorPlan(), given.traffic, given.seed)
+                                                    : Traffic(plan, given.traffic, given.seed)),
+        renderer(plan,
+                 given.path == FlightPath::kCorridor ? build_corridor(CorridorPlan(), given.seed)
+                                                     : build_city(plan, given.seed),
+                 camera, given.seed) {
     frames = static_cast<std::size_t>(std::llround(flight.duration() * options.fps));
     if (options.frames != 0) frames = std::min(frames, options.frames);
   }
@@ -99,6 +106,10 @@ SimulatedView Simulator::render(std::size_t index, SimulatedParts parts) {
   view.frame.index = index;
   view.frame.timestamp = static_cast<double>(index) / impl_->options.fps;
   const SE3 pose = T_world_camera(index);
+  if (impl_->options.imu) {
+    const double since = view.frame.timestamp - 1.0 / impl_->options.fps;
+    view.frame.inertial = inertial_samples(impl_->flight, since, view.frame.timestamp, impl_->options.seed);
+  }
   view.frame.T_world_camera = pose;
   simulation::Mesh movables;
   impl_->traffic.add_to(movables, view.frame.timestamp, pose);

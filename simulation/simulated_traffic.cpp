@@ -24,6 +24,18 @@ Traffic::Traffic(const CityPlan& plan, TrafficLevel level, std::uint32_t seed)
   for (const float x : {-6.0F, 58.0F}) fill_street_along_y(plan, x, level, dice);
 }
 
+// People who walk to and fro along the first part of the corridor, on either side of its centre line.
+Traffic::Traffic(const CorridorPlan& plan, TrafficLevel level, std::uint32_t seed) : kerb_height_(0.0F) {
+  if (level == TrafficLevel::kNone) return;
+  Dice dice(mix(seed, 0x7aff1cU));
+  const float gap = level == TrafficLevel::kHeavy ? 7.0F : 18.0F;
+  for (const float side : {-0.65F, 0.65F}) {
+    fill_lane(Kind::kPedestrian, {plan.start + 1.0F, side}, {plan.corner - 0.5F, side},
+              dice.between(0.6F, 1.3F), gap, 0.0F, dice);
+  }
+  for (Actor& actor : actors_) actor.to_and_fro = true;
+}
+
 void Traffic::park_cars(const CityPlan& plan, Dice& dice) {
   const auto row = [&](const Vector2f& from, const Vector2f& to) {
     const Vector2f along = (to - from).normalized();

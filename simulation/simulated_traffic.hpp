@@ -7,6 +7,7 @@
 #include "roslam/geometry/se3.hpp"
 #include "simulation/simulated_actors.hpp"
 #include "simulation/simulated_city.hpp"
+#include "simulation/simulated_corridor.hpp"
 #include "simulation/simulated_noise.hpp"
 #include "simulation/simulated_options.hpp"
 
@@ -16,6 +17,7 @@ namespace roslam::simulation {
 class Traffic {
  public:
   Traffic(const CityPlan& plan, TrafficLevel level, std::uint32_t seed);
+  Traffic(const CorridorPlan& plan, TrafficLevel level, std::uint32_t seed);
 
   /// Adds the actors near the camera at that time (seconds).
   void add_to(Mesh& mesh, double time, const SE3& T_world_camera) const;

@@ -60,6 +60,21 @@ TEST(DenseMapper, LeavesBeWhatHardlyMoved) {
   EXPECT_EQ(mapper.follow({{id(0), {kHere, nudge * walk.truth[0]}}}, 0.2), 1U);
 }
 
+TEST(DenseMapper, LosesWhatWasWithdrawn) {
+  const Walk walk;
+  DenseMapper mapper(dense_scene::options(), {}), fresh(dense_scene::options(), {});
+  for (std::size_t i = 0; i < 4; ++i) {
+    mapper.insert(id(i), walk.view(i), {kHere, i == 2 ? walk.wrong(i) : walk.truth[i]});
+    if (i != 2) fresh.insert(id(i), walk.view(i), {kHere, walk.truth[i]});
+  }
+  EXPECT_EQ(mapper.follow({{id(2), KeyframePose{}}}), 1U);
+  expect_same(*mapper.map(kHere), *fresh.map(kHere));
+  EXPECT_EQ(mapper.keyframes(), fresh.keyframes());
+  EXPECT_EQ(mapper.view_bytes(), fresh.view_bytes());
+  mapper.insert(id(5), walk.view(2), KeyframePose{});  // withdrawn before it was fused
+  EXPECT_EQ(mapper.keyframes(), fresh.keyframes());
+}
+
 TEST(DenseMapper, KeepsWorldsApartUntilTheyMeet) {
   const Walk walk;
   DenseMapper mapper(dense_scene::options(), {}), fresh(dense_scene::options(), {});
@@ -167,7 +182,9 @@ TEST(DepthKeyframe, IsUnpackedAsItWasPacked) {
   DepthKeyframe view = walk.view(0);
   view.labels.setTo(7, view.depth > 3.0F);
   view.provenance.row(5).setTo(255);
+  view.noise = DepthNoise{0.001, 0.007};
   const DepthKeyframe again = unpack(pack(view));
+  EXPECT_EQ(again.noise, view.noise);
   EXPECT_LE(cv::norm(view.depth, again.depth, cv::NORM_INF), 0.00051);
   EXPECT_EQ(cv::norm(view.labels, again.labels, cv::NORM_INF), 0.0);
   EXPECT_EQ(cv::norm(view.provenance, again.provenance, cv::NORM_INF), 0.0);

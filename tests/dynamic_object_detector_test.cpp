@@ -125,6 +125,9 @@ TEST_F(WholeRemoval, ALabelledThingThatMovesIsRemoved) {
     EXPECT_FALSE(people[0].is_at_rest) << i;
     EXPECT_TRUE(dynamic_objects.resting.empty());
     EXPECT_EQ(dynamic_objects.label_age, 0);
+    if (!dynamic_objects.still.empty()) {
+      EXPECT_LT(share_set(view.shows(kThing), dynamic_objects.still), 0.1) << i;
+    }
   }
   EXPECT_TRUE(detector_->faults().empty());
 }
@@ -136,6 +139,11 @@ TEST_F(WholeRemoval, ALabelledThingAtRestIsNamedSoAfterAWhile) {
     const DynamicObjects dynamic_objects = play(view, labels(i, view.shows(kThing)));
     ASSERT_EQ(dynamic_objects.objects.size(), 1U);
     expect_removed(dynamic_objects, view.shows(kThing));
+    if (static_cast<double>(i) / kRate > 1.3) {  // seen without motion for a second
+      ASSERT_FALSE(dynamic_objects.still.empty()) << i;
+      EXPECT_GT(share_set(view.shows(kThing), dynamic_objects.still), 0.6) << i;
+      EXPECT_EQ(cv::countNonZero(dynamic_objects.still & ~dynamic_objects.mask), 0);
+    }
     if (!dynamic_objects.objects[0].is_at_rest) {
       EXPECT_TRUE(dynamic_objects.resting.empty()) << i;
       EXPECT_FALSE(first) << i;

@@ -74,6 +74,9 @@ TEST(DynamicObjectOptions, EachBadFieldIsNamed) {
         [](auto& o) { o.growth = kNaN; }}},
       {"edge_band", {[](auto& o) { o.edge_band = -1; }, [](auto& o) { o.edge_band = 201; }}},
       {"margin", {[](auto& o) { o.margin = -1; }, [](auto& o) { o.margin = 201; }}},
+      {"resting_weight",
+       {[](auto& o) { o.resting_weight = -0.1; }, [](auto& o) { o.resting_weight = 1.1; },
+        [](auto& o) { o.resting_weight = kNaN; }}},
       {"scarce_points", {[](auto& o) { o.scarce_points = -1; }}}};
   for (const auto& [field, changes] : all) {
     for (std::size_t i = 0; i < changes.size(); ++i) {
@@ -111,6 +114,7 @@ TEST(DynamicObjectOptions, ModesAreNamedAndRecognised) {
   EXPECT_FALSE(dynaslam->flow || dynaslam->keep_resting);
   EXPECT_EQ(dynaslam->min_confidence, 0.0);
   EXPECT_EQ(dynaslam->scarce_points, 0);
+  EXPECT_EQ(dynaslam->resting_weight, 0.0);
   // The switches alone do not select the mode that imitates another system.
   DynamicObjectOptions without_flow;
   without_flow.flow = false;

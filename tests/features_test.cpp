@@ -137,6 +137,36 @@ TEST(OrbExtractor, NeverReturnsPointsOnOrNearTheMask) {
   }
 }
 
+TEST(OrbExtractor, PointsInAPartOfTheMaskChangeNoOthers) {
+  const cv::Mat image = textured_image(3);
+  cv::Mat mask = cv::Mat::zeros(480, 640, CV_8UC1);
+  mask(cv::Rect(100, 80, 400, 300)).setTo(255);
+  cv::Mat part = cv::Mat::zeros(480, 640, CV_8UC1);
+  part(cv::Rect(150, 120, 200, 200)).setTo(255);
+  const OrbExtractor extractor;
+  std::vector<cv::Point2f> removed, removed_with;
+  const auto without = extractor.extract(image, mask, &removed);
+  const auto with = extractor.extract(image, mask, part, &removed_with);
+  EXPECT_EQ(removed, removed_with);
+  std::size_t others = 0;
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    if (i > 0) {
+      EXPECT_LE(with[i - 1].level, with[i].level);
+    }
+    if (with[i].is_in_part) {
+      EXPECT_EQ(part.at<uchar>(cvRound(with[i].pixel.y), cvRound(with[i].pixel.x)), 255);
+      continue;
+    }
+    ASSERT_LT(others, without.size());
+    EXPECT_EQ(with[i].pixel, without[others].pixel);
+    EXPECT_EQ(with[i].descriptor, without[others++].descriptor);
+  }
+  EXPECT_EQ(others, without.size());
+  // As dense as elsewhere: 13 % of the image.
+  const double expected = 200.0 * 200.0 / (640.0 * 480.0) * OrbOptions().features;
+  EXPECT_NEAR(static_cast<double>(with.size() - others), expected, 0.1 * expected);
+}
+
 TEST(OrbExtractor, WholeImageMaskedGivesNothing) {
   const cv::Mat mask(480, 640, CV_8UC1, cv::Scalar(255));
   EXPECT_TRUE(OrbExtractor().extract(textured_image(4), mask).empty());

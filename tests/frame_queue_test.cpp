@@ -78,6 +78,27 @@ TEST(FrameQueue, NeverDropsTwoInARowOfASteadyOverload) {
   EXPECT_NEAR(static_cast<double>(queue.dropped()), 3000.0 * (1.0 - 1.0 / 1.3), 5.0);
 }
 
+TEST(FrameQueue, HandsTheInertialSamplesOfDroppedFramesToTheNext) {
+  FrameQueue queue(2);
+  std::size_t seen = 0;
+  const auto take = [&] {
+    const auto frame = queue.pop();
+    ASSERT_TRUE(frame);
+    for (const InertialSample& sample : frame->inertial)
+      EXPECT_EQ(sample.timestamp, static_cast<double>(seen++));  // all, each once, in order
+    EXPECT_EQ(seen, frame->index + 1);
+  };
+  for (std::size_t i = 0; i < 100; ++i) {
+    Frame frame = numbered(i);
+    frame.inertial.push_back({static_cast<double>(i)});
+    queue.push(std::move(frame));
+    if (i % 40 > 30) take();
+  }
+  queue.close();
+  while (seen < 100) take();
+  EXPECT_GT(queue.dropped(), 20U);
+}
+
 TEST(FrameQueue, EndsWithAllThatWaitsOrWithNothing) {
   FrameQueue closed(2);
   push(closed, 0, 5);

@@ -64,6 +64,35 @@ TEST(PoseCheck, SaysNothingWhereNoTimePassed) {
   EXPECT_EQ(check(hovering, -1.0, at(50.0)), PoseDoubt::kNone);
 }
 
+Matrix6d covariance(const Eigen::Vector3d& position_sigmas, double rotation_degrees) {
+  Vector6d sigmas;
+  sigmas << position_sigmas, Eigen::Vector3d::Constant(rotation_degrees * 3.14159265358979 / 180.0);
+  return sigmas.array().square().matrix().asDiagonal();
+}
+
+TEST(PoseCheck, RefusesWhatIsHardlyConstrained) {
+  const PlausibilityOptions options;
+  EXPECT_EQ(check_certainty(covariance({0.01, 0.02, 0.2}, 1.0), options), PoseDoubt::kNone);
+  EXPECT_EQ(check_certainty(covariance({0.01, 0.02, 0.3}, 1.0), options), PoseDoubt::kUncertain);
+  EXPECT_EQ(check_certainty(covariance({0.01, 0.02, 0.01}, 6.0), options), PoseDoubt::kUncertain);
+}
+
+// A far wall without depth leaves the distance to it open, whatever the camera's axes.
+TEST(PoseCheck, NamesTheDirectionsThatNothingConstrains) {
+  const PlausibilityOptions options;
+  EXPECT_TRUE(unconstrained_directions(covariance({0.01, 0.04, 0.02}, 0.1), options).empty());
+  Matrix6d turned = covariance({0.01, 0.02, 0.2}, 0.1);
+  const Eigen::Matrix3d R = so3_exp({0.3, -0.8, 0.2}).toRotationMatrix();
+  turned.topLeftCorner<3, 3>() = R * turned.topLeftCorner<3, 3>() * R.transpose();
+  const auto one = unconstrained_directions(turned, options);
+  ASSERT_EQ(one.size(), 1U);
+  EXPECT_NEAR(std::abs(one[0].dot(R.col(2))), 1.0, 1e-9);
+  const auto two = unconstrained_directions(covariance({0.1, 0.02, 0.2}, 0.1), options);
+  ASSERT_EQ(two.size(), 2U);
+  EXPECT_NEAR(std::abs(two[0].z()), 1.0, 1e-9);
+  EXPECT_NEAR(std::abs(two[1].x()), 1.0, 1e-9);
+}
+
 TEST(PoseCheck, OptionsNameWhatIsOutOfRange) {
   const auto refused = [](auto change) {
     PlausibilityOptions options;
@@ -78,6 +107,9 @@ TEST(PoseCheck, OptionsNameWhatIsOutOfRange) {
   EXPECT_NE(refused([](auto& o) { o.min_found_share = 1.0; }).find("min_found_share"), std::string::npos);
   EXPECT_NE(refused([](auto& o) { o.poor_found_share = -0.1; }).find("poor_found"), std::string::npos);
   EXPECT_NE(refused([](auto& o) { o.max_pixel_error = 0.0; }).find("max_pixel"), std::string::npos);
+  EXPECT_NE(refused([](auto& o) { o.max_position_sigma = 0.0; }).find("max_position"), std::string::npos);
+  EXPECT_NE(refused([](auto& o) { o.max_rotation_sigma = -1.0; }).find("max_rotation"), std::string::npos);
+  EXPECT_NE(refused([](auto& o) { o.constrained_sigma = 0.0; }).find("constrained"), std::string::npos);
   EXPECT_NE(refused([](auto& o) { o.max_speed = 0.0; }).find("max_speed"), std::string::npos);
   EXPECT_NE(refused([](auto& o) { o.max_acceleration = std::nan(""); }).find("max_acc"), std::string::npos);
   EXPECT_NE(refused([](auto& o) { o.max_turn_rate = -1.0; }).find("max_turn_rate"), std::string::npos);

@@ -63,12 +63,12 @@ class OptimisePose : public testing::Test {
   // limit after Huber if robust; one behind the camera counts as an outlier.
   double cost(const Measurements& measurements, const SE3& pose, bool robust) const {
     double sum = 0.0;
-    for (const auto& [point_world, measurement] : measurements) {
+    for (const auto& [point_world, measurement, weight] : measurements) {
       const Eigen::Vector3d point = pose * point_world;
       const double squared = point.z() <= 1e-3
                                  ? outlier_limit(measurement)
                                  : ReprojectionError{camera_, measurement}.error(point).squaredNorm();
-      sum += robust ? huber(squared, chi_squared_limit(measurement)) : squared;
+      sum += weight * (robust ? huber(squared, chi_squared_limit(measurement)) : squared);
     }
     return sum;
   }
@@ -78,7 +78,7 @@ class OptimisePose : public testing::Test {
     for (int iteration = 0; iteration < iterations; ++iteration) {
       Matrix6d hessian = 1e-9 * Matrix6d::Identity();
       Vector6d gradient = Vector6d::Zero();
-      for (const auto& [point_world, measurement] : measurements) {
+      for (const auto& [point_world, measurement, share] : measurements) {
         const Eigen::Vector3d point = pose * point_world;
         if (point.z() <= 1e-3) continue;
         const ReprojectionError term{camera_, measurement};
@@ -88,7 +88,7 @@ class OptimisePose : public testing::Test {
         jacobian.rightCols<3>() = -term.jacobian(point) * skew(point);
         const double limit = chi_squared_limit(measurement);
         const double weight =
-            robust && error.squaredNorm() > limit ? std::sqrt(limit / error.squaredNorm()) : 1.0;
+            share * (robust && error.squaredNorm() > limit ? std::sqrt(limit / error.squaredNorm()) : 1.0);
         hessian += weight * jacobian.transpose() * jacobian;
         gradient += weight * jacobian.transpose() * error;
       }
@@ -220,7 +220,9 @@ TEST_F(OptimisePose, TellsHowLargeThePixelErrorsAre) {
 }
 
 TEST_F(OptimisePose, DerivativesByThePoseAgreeWithNumericOnes) {
-  const auto [point_world, measurement] = measure({0.4, -0.3, 2.2}, true, {3.0, -2.0});
+  const PoseMeasurement measured = measure({0.4, -0.3, 2.2}, true, {3.0, -2.0});
+  const auto& [point_world, measurement, weight] = measured;
+  EXPECT_EQ(weight, 1.0);
   const ReprojectionError term{camera_, measurement};
   const Eigen::Vector3d point = truth_ * point_world;
   Eigen::Matrix<double, 3, 6> analytic;
@@ -358,7 +360,7 @@ TEST_F(DegenerateInput, OnePointMeasuredManyTimes) {
 
 TEST_F(DegenerateInput, AllPointsBehindTheCamera) {
   auto measurements = scene(20, true);
-  for (auto& [point_world, measurement] : measurements) {
+  for (auto& [point_world, measurement, weight] : measurements) {
     const Eigen::Vector3d in_camera = truth_ * point_world;
     point_world = truth_.inverse() * Eigen::Vector3d(in_camera.x(), in_camera.y(), -in_camera.z());
   }

@@ -26,6 +26,7 @@ class NoiseSource : public FrameSource {
     frame.index = next_++;
     frame.timestamp = 100.0 + static_cast<double>(frame.index) / 30.0;
     frame.colour = image_;
+    frame.inertial.push_back({frame.timestamp});
     return frame;
   }
   const Camera& camera() const override { return camera_; }
@@ -64,6 +65,7 @@ TEST(DegradedSource, TakesEachNthImageAsItIs) {
     ASSERT_EQ(frames.size(), (NoiseSource::kFrames + n - 1) / n);
     for (std::size_t i = 0; i < frames.size(); ++i) {
       EXPECT_EQ(frames[i].index, i * n);
+      EXPECT_EQ(frames[i].inertial.size(), i == 0 ? 1U : n);  // those of missing images as well
       EXPECT_EQ(cv::norm(frames[i].colour, image, cv::NORM_INF), 0.0);
     }
     ++n;

@@ -15,6 +15,8 @@
 
 #include "roslam/common/error.hpp"
 #include "simulation/depth_noise.hpp"
+#include "simulation/simulated_corridor.hpp"
+#include "simulation/simulated_imu.hpp"
 #include "simulation/simulated_source.hpp"
 #include "tests/scratch.hpp"
 
@@ -413,6 +415,56 @@ TEST(SimulatedGusts, TurnTheDroneAtUpToSixtyDegreesASecond) {
     EXPECT_GT(largest_turn_rate(1.0, seed), 40.0);
     EXPECT_LT(largest_turn_rate(1.0, seed), 70.0);
   }
+}
+
+TEST(SimulatedCorridor, IsClosedAndFlownBetweenItsWalls) {
+  auto options = options_for(FlightPath::kCorridor, TrafficLevel::kLight);
+  options.depth = DepthModel::kIdeal;
+  options.fps = 5.0;
+  Simulator simulator(options);
+  const CorridorPlan plan;
+  bool has_people = false;
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    const Eigen::Vector3d at = simulator.T_world_camera(i).translation();
+    const double aside = at.x() < 19.0  ? at.y()
+                         : at.y() > 3.0 ? at.x() - static_cast<double>(plan.corner)
+                                        : 0.0;
+    EXPECT_LT(std::abs(aside), 0.5) << i;
+    EXPECT_NEAR(at.z(), 1.5, 0.2);
+    if (i % 40 != 5) continue;
+    const auto view = simulator.render(i);
+    EXPECT_EQ(cv::countNonZero(view.frame.depth <= 0.0F), 0) << i;  // nothing is open to the sky
+    has_people |= cv::countNonZero(view.instances) > 100;
+  }
+  EXPECT_TRUE(has_people);
+  EXPECT_GT(simulator.T_world_camera(simulator.size() - 1).translation().y(), 10.0);
+}
+
+TEST(SimulatedImu, FeelsGravityAndTheTurnsOfTheFlight) {
+  SimulatorOptions options;
+  options.path = FlightPath::kHover;
+  options.seed = 3;
+  const Flight flight(options);
+  const SE3 T_camera_imu = simulated_imu().T_camera_imu;
+  const auto samples = inertial_samples(flight, 1.0, 3.0, options.seed);
+  ASSERT_EQ(samples.size(), 400U);
+  EXPECT_NEAR(samples.front().timestamp, 1.005, 1e-9);
+  EXPECT_NEAR(samples.back().timestamp, 3.0, 1e-9);
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  Eigen::Vector3d turned = Eigen::Vector3d::Zero();
+  for (const InertialSample& sample : samples) {
+    const SE3 T_world_imu = flight.T_world_camera(sample.timestamp) * T_camera_imu;
+    up += T_world_imu.rotation() * sample.acceleration / 400.0;
+    turned += T_world_imu.rotation() * (sample.turn_rate - gyroscope_bias(sample.timestamp, 3)) / 200.0;
+  }
+  EXPECT_LT((up - Eigen::Vector3d(0, 0, 9.81)).norm(), 0.05) << up.transpose();
+  const SE3 begin = flight.T_world_camera(1.0025);
+  const SE3 end = flight.T_world_camera(3.0025);
+  EXPECT_NEAR(turned.z(), so3_log(end.rotation() * begin.rotation().inverse()).z(), 0.01);
+  // The same whatever was asked for before.
+  const auto again = inertial_samples(flight, 1.9, 2.0, options.seed);
+  ASSERT_EQ(again.size(), 20U);
+  EXPECT_EQ(again.back().turn_rate, samples[199].turn_rate);
 }
 
 }  // namespace

@@ -136,6 +136,21 @@ TEST_F(PoseOptimiser, StaysNearTheTruthWithNoise) {
   EXPECT_GT(pose.inliers, 290);
 }
 
+TEST_F(PoseOptimiser, AMeasurementCountsByItsWeight) {
+  auto measurements = measure(100, 0.0, 0.0, true);
+  // A quarter of them are off by a little, in the same direction.
+  for (std::size_t i = 0; i < measurements.size(); i += 4)
+    measurements[i].measurement.pixel += Eigen::Vector2d(1.5, 0.0);
+  const auto error_with = [&](double weight) {
+    for (std::size_t i = 0; i < measurements.size(); i += 4) measurements[i].weight = weight;
+    return rotation_error(optimise_pose(camera_, measurements, disturbed()).T_camera_world);
+  };
+  const double full = error_with(1.0);
+  EXPECT_GT(full, 1e-4);
+  EXPECT_LT(error_with(0.25), 0.5 * full);
+  EXPECT_LT(error_with(0.0), 1e-5);
+}
+
 TEST_F(PoseOptimiser, SetsOutliersAside) {
   const auto measurements = measure(300, 1.0, 0.3, true);
   const auto pose = optimise_pose(camera_, measurements, disturbed());

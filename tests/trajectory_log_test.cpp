@@ -103,6 +103,23 @@ TEST_F(FrameLog, APoseOutlivesItsReferenceKeyframe) {
   EXPECT_EQ(log_.frames_by_submap(map_), (Frames{{SubmapId{0}, 1}}));
 }
 
+TEST_F(FrameLog, WithdrawnPosesLeaveTheTrajectory) {
+  const KeyframeId a = add_keyframe(at(0.0));
+  add(0, at(0.1), a);
+  add(1, at(5.2), a);
+  add_without_pose(2, TrackingState::kRecentlyLost);
+  add(3, at(5.4), a, TrackingState::kPredicted);
+  add(4, at(0.4), a);
+  EXPECT_EQ(log_.withdraw_after(0.0), 2U);
+  expect_trajectory(SubmapId{0}, {{0.0, at(0.1)}, {1.0, at(0.4)}});
+  EXPECT_EQ(log_.withdrawn(), 2U);
+  EXPECT_EQ(log_.by_state().at(TrackingState::kTracking), 2U);
+  EXPECT_EQ(log_.by_state().at(TrackingState::kPredicted), 0U);
+  EXPECT_EQ(log_.by_state().at(TrackingState::kRecentlyLost), 3U);
+  EXPECT_EQ(log_.withdraw_after(-1.0), 1U);
+  expect_trajectory(SubmapId{0}, {{1.0, at(0.4)}});
+}
+
 TEST_F(FrameLog, FramesWithoutAPoseAreCountedAndNotInTheTrajectory) {
   const KeyframeId a = add_keyframe(at(0.0));
   add_without_pose(0, TrackingState::kInitialising);

@@ -121,6 +121,29 @@ TEST_F(TumFolder, DividesDepthByTheFactorOfTheCamera) {
   EXPECT_EQ(depth_to_metres(cv::Mat::zeros(1, 1, CV_16UC1), 1000.0).at<float>(0, 0), 0.0F);
 }
 
+TEST_F(TumFolder, FramesCarryTheInertialSamplesSinceTheFrameBefore) {
+  write("11 colour.png\n12 absent.png\n13 colour.png\n", "11 depth.png\n");
+  std::ofstream(folder_ / "imu.txt") << "# timestamp wx wy wz ax ay az\n"
+                                        "1 0 0 0 0 0 0\n"
+                                        "10.5 1 0 0 0 0 9.8\n"
+                                        "11 2 0 0 0 0 9.8\n"
+                                        "11.5 3 0 0 0 0 9.8\n"
+                                        "12.5 4 0 0 0 0 9.8\n"
+                                        "14 5 0 0 0 0 9.8\n";
+  TumSource without(folder_, camera_);
+  EXPECT_TRUE(without.next()->inertial.empty());
+  EXPECT_EQ(without.notes().count("imu.txt is not used, as the camera file has no imu"), 1u);
+  camera_.imu.emplace();
+  TumSource source(folder_, camera_);
+  const auto frames = read(source);
+  ASSERT_EQ(frames.size(), 2u);
+  ASSERT_EQ(frames[0].inertial.size(), 2u);
+  EXPECT_EQ(frames[0].inertial[0].turn_rate.x(), 1.0);
+  ASSERT_EQ(frames[1].inertial.size(), 2u);  // those of the frame that is missing as well
+  EXPECT_EQ(frames[1].inertial[0].timestamp, 11.5);
+  EXPECT_EQ(frames[1].inertial[1].acceleration.z(), 9.8);
+}
+
 TEST_F(TumFolder, OfRepeatedTimesTheFirstStays) {
   write("1 colour.png\n1 grey.png\n", "1 depth.png\n");
   TumSource source(folder_, camera_);

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,7 @@ struct SimulateArguments {
   std::string depth = "d455";
   std::size_t frames = 0;
   std::uint32_t seed = 1;
+  bool imu = false;
   bool overwrite = false;
   bool json = false;
 };
@@ -45,6 +47,7 @@ Example, ten seconds with many cars and people:
 Writes to the folder of --out; images are named after their timestamp in seconds:
   rgb/ rgb.txt            colour
   depth/ depth.txt        depth, 16 bit, 1000 per metre, 0 = unknown
+  imu.txt                 with --imu: timestamp (s), turn rates (rad/s), accelerations (m/s^2)
   groundtruth.txt         camera poses: timestamp (s), position (m), quaternion x y z w
   camera.yaml             camera parameters, for --camera of roslam run
   labels/                 8 bit: class of each pixel, Cityscapes train ids, 255 = none of them
@@ -74,6 +77,15 @@ void write_images(const fs::path& out, const std::string& name, const SimulatedV
                    packed_depth(view.background_depth, camera.depth_units_per_metre));
 }
 
+void write_inertial(TextFile& file, const std::vector<InertialSample>& samples) {
+  for (const auto& [time, w, a] : samples) {
+    char text[256];
+    std::snprintf(text, sizeof(text), "%.6f %.9f %.9f %.9f %.9f %.9f %.9f", time, w.x(), w.y(), w.z(), a.x(),
+                  a.y(), a.z());
+    file.line(text);
+  }
+}
+
 void simulate(const SimulateArguments& arguments) {
   const InterruptWatcher interrupt;
   SimulatorOptions options;
@@ -82,9 +94,10 @@ void simulate(const SimulateArguments& arguments) {
   options.depth = *depth_model_from(arguments.depth);
   options.frames = arguments.frames;
   options.seed = arguments.seed;
+  options.imu = arguments.imu;
   const recording::OutputFolder out(arguments.out, "simulate",
-                                    {"rgb.txt", "depth.txt", "groundtruth.txt", "camera.yaml", "rgb", "depth",
-                                     "labels", "instances", "background"},
+                                    {"rgb.txt", "depth.txt", "groundtruth.txt", "imu.txt", "camera.yaml",
+                                     "rgb", "depth", "labels", "instances", "background"},
                                     arguments.overwrite);
   for (const char* folder : {"rgb", "depth", "labels", "instances", "background/rgb", "background/depth"}) {
     make_folder(arguments.out / folder);
@@ -95,6 +108,9 @@ void simulate(const SimulateArguments& arguments) {
   TextFile colours(arguments.out / "rgb.txt");
   TextFile depths(arguments.out / "depth.txt");
   TextFile poses(arguments.out / "groundtruth.txt");
+  std::optional<TextFile> inertial;
+  if (arguments.imu) inertial.emplace(arguments.out / "imu.txt");
+  if (inertial) inertial->line("# timestamp wx wy wz ax ay az");
   colours.line("# timestamp filename");
   depths.line("# timestamp filename");
   poses.line("# timestamp tx ty tz qx qy qz qw");
@@ -107,11 +123,13 @@ void simulate(const SimulateArguments& arguments) {
     colours.line(time + " rgb/" + time + ".png");
     depths.line(time + " depth/" + time + ".png");
     poses.line(pose_line(view.frame.timestamp, *view.frame.T_world_camera));
+    if (inertial) write_inertial(*inertial, view.frame.inertial);
     progress.show(written + 1, "rendered");
   }
   colours.close();
   depths.close();
   poses.close();
+  if (inertial) inertial->close();
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   if (arguments.json) {
     const nlohmann::json summary{{"out", arguments.out.string()}, {"path", arguments.path},
@@ -131,15 +149,15 @@ void simulate(const SimulateArguments& arguments) {
 void add_simulate_command(CLI::App& program) {
   auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command = program.add_subcommand(
-      "simulate", "Render a simulated flight of a drone through a street, with ground truth");
+      "simulate", "Render a simulated flight of a drone through a street or a corridor, with ground truth");
   command->footer(kHelp);
   command
       ->add_option(
           "path", arguments->path,
           "Flight path: street, 50 m along a street; loop, around a block; hover, turning on the spot; turn, "
-          "around a corner")
+          "around a corner; corridor, in a building with white walls and repeated tiles")
       ->required()
-      ->check(CLI::IsMember({"street", "loop", "hover", "turn"}));
+      ->check(CLI::IsMember({"street", "loop", "hover", "turn", "corridor"}));
   command->add_option("--out", arguments->out, "Folder the sequence is written to; made if it does not exist")
       ->required();
   command
@@ -159,6 +177,8 @@ void add_simulate_command(CLI::App& program) {
   command->add_option("--seed", arguments->seed, "Seed of the generated street and traffic")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  command->add_flag("--imu", arguments->imu,
+                    "Write the samples of a gyroscope and an accelerometer as well, 200 Hz");
   command->add_flag("--overwrite", arguments->overwrite,
                     "Replace files in the folder of --out that this command did not write");
   command->add_flag("--json", arguments->json, "Print the summary as one JSON object on stdout");

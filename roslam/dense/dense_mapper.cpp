@@ -39,7 +39,7 @@ TsdfVolume& DenseMapper::map_of(SubmapId submap) {
 
 void DenseMapper::insert(KeyframeId id, const DepthKeyframe& keyframe, const KeyframePose& pose) {
   const auto depth = median_depth(keyframe.depth);
-  if (!depth || !pose.T_world_camera.is_finite()) return;
+  if (!depth || !pose.T_world_camera.is_finite() || !pose.submap.is_valid()) return;
   if (voxel_size_ == 0.0) voxel_size_ = *depth < kIndoors ? kFineVoxel : kWideVoxel;
   Fused fused{pack(keyframe), pose, *depth};
   map_of(pose.submap).integrate(unpack(fused.keyframe), pose.T_world_camera);
@@ -60,6 +60,7 @@ bool DenseMapper::has_moved(const Fused& fused, const KeyframePose& pose, double
 std::size_t DenseMapper::follow(const std::map<KeyframeId, KeyframePose>& poses, double share) {
   std::map<SubmapId, BlockSet> stale;
   std::vector<const std::pair<const KeyframeId, KeyframePose>*> moved;
+  std::vector<KeyframeId> withdrawn;
   for (const auto& [id, fused] : fused_) {
     const auto pose = poses.find(id);
     if (pose == poses.end() || !has_moved(fused, pose->second, share)) continue;
@@ -67,13 +68,21 @@ std::size_t DenseMapper::follow(const std::map<KeyframeId, KeyframePose>& poses,
     stale[fused.pose.submap].merge(
         map_of(fused.pose.submap).affected_blocks(unpacked, fused.pose.T_world_camera));
     const auto& [submap, T_world_camera] = pose->second;
+    if (!submap.is_valid()) {
+      withdrawn.push_back(id);
+      continue;
+    }
     stale[submap].merge(map_of(submap).affected_blocks(unpacked, T_world_camera));
     moved.push_back(&*pose);
+  }
+  for (const KeyframeId id : withdrawn) {
+    view_bytes_ -= fused_.at(id).keyframe.bytes();
+    fused_.erase(id);
   }
   for (const auto* pose : moved) fused_.at(pose->first).pose = pose->second;
   for (const auto& [submap, blocks] : stale) reintegrate(submap, blocks);
   limit_memory();
-  return moved.size();
+  return moved.size() + withdrawn.size();
 }
 
 void DenseMapper::reintegrate(SubmapId submap, const BlockSet& blocks) {

@@ -25,11 +25,13 @@ class DenseMapper {
   /// Throws OptionsError.
   DenseMapper(const DenseOptions& options, const MeasurementNoise& noise);
 
-  /// Fuses a keyframe that was not inserted before. Ignored if it has no depth or its pose is not finite.
+  /// Fuses a keyframe that was not inserted before. Ignored if it has no depth, its pose is not finite or it
+  /// has no submap.
   void insert(KeyframeId id, const DepthKeyframe& keyframe, const KeyframePose& pose);
 
   /// Re-integrates keyframes at their corrected poses. Those that moved by less than share times
-  /// DenseOptions::follow voxels stay. Returns the number of moved keyframes.
+  /// DenseOptions::follow voxels stay; those without a submap were withdrawn and leave the map. Returns the
+  /// number of keyframes that moved or left.
   std::size_t follow(const std::map<KeyframeId, KeyframePose>& poses, double share = 1.0);
 
   /// Ids of the fused keyframes, ascending.

@@ -50,8 +50,12 @@ PackedDepthKeyframe pack(const DepthKeyframe& keyframe) {
       keyframe.beyond.empty() ? cv::Mat::zeros(keyframe.labels.size(), CV_8UC1) : keyframe.beyond;
   cv::merge(std::array<cv::Mat, 3>{keyframe.labels, keyframe.provenance, beyond}, marks);
   const std::vector<int> fast{cv::IMWRITE_PNG_COMPRESSION, 1};
-  return {keyframe.camera, encoded(".jpg", keyframe.colour, {cv::IMWRITE_JPEG_QUALITY, kColourQuality}),
-          encoded(".png", millimetres, fast), encoded(".png", marks, fast), keyframe.reach};
+  return {keyframe.camera,
+          encoded(".jpg", keyframe.colour, {cv::IMWRITE_JPEG_QUALITY, kColourQuality}),
+          encoded(".png", millimetres, fast),
+          encoded(".png", marks, fast),
+          keyframe.reach,
+          keyframe.noise};
 }
 
 DepthKeyframe unpack(const PackedDepthKeyframe& packed) {
@@ -64,6 +68,7 @@ DepthKeyframe unpack(const PackedDepthKeyframe& packed) {
   cv::extractChannel(marks, keyframe.provenance, 1);
   cv::extractChannel(marks, keyframe.beyond, 2);
   keyframe.reach = packed.reach;
+  keyframe.noise = packed.noise;
   return keyframe;
 }
 

@@ -4,11 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "roslam/dense/dense_options.hpp"
 #include "roslam/features/observed_frame.hpp"
 #include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/depth_noise.hpp"
 #include "roslam/geometry/pixel_rays.hpp"
 #include "roslam/geometry/se3.hpp"
 
@@ -23,6 +25,7 @@ struct DepthKeyframe {
   cv::Mat provenance;   ///< CV_8UC1, values of Provenance
   cv::Mat beyond = {};  ///< CV_8UC1, nonzero where the surface lies beyond the reach; may be empty
   double reach = 0.0;   ///< metres up to which depth is fused
+  std::optional<DepthNoise> noise = {};  ///< where known better than by the options
 };
 
 /// A compressed keyframe (colour as JPEG, depth in millimetres). Lossy, so keyframes are packed before they
@@ -31,6 +34,7 @@ struct PackedDepthKeyframe {
   Camera camera;
   std::vector<std::uint8_t> colour, depth, marks;
   double reach = 0.0;  ///< metres
+  std::optional<DepthNoise> noise;
 
   std::size_t bytes() const { return colour.size() + depth.size() + marks.size(); }
 };

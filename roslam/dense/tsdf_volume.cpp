@@ -46,7 +46,7 @@ struct TsdfVolume::RangeImage {
   RangeImage(const DepthKeyframe& k, const SE3& T_world_camera, const MeasurementNoise& noise)
       : keyframe(k),
         planes(local_planes(k.depth, k.camera)),
-        weights(weights_of(k.depth, noise)),
+        weights(weights_of(k.depth, noise.known_of({}, k.noise))),
         tiles(farthest_by_tile(k.depth)),
         world_from_camera(T_world_camera.rotation().toRotationMatrix().cast<float>()),
         camera_from_world(world_from_camera.transpose()),

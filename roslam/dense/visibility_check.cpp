@@ -24,6 +24,7 @@ VisibilityCheck::VisibilityCheck(const SurfaceMap& surface, double voxel_size, c
 
 void VisibilityCheck::ask(const DepthKeyframe& keyframe, const SE3& T_world_camera) {
   const SE3f camera_from_world(T_world_camera.inverse());
+  const DepthNoise noise = keyframe.noise.value_or(noise_.depth_noise());
   const auto fx = static_cast<float>(keyframe.camera.fx), fy = static_cast<float>(keyframe.camera.fy);
   const auto cx = static_cast<float>(keyframe.camera.cx) + 0.5F,
              cy = static_cast<float>(keyframe.camera.cy) + 0.5F;
@@ -45,7 +46,7 @@ void VisibilityCheck::ask(const DepthKeyframe& keyframe, const SE3& T_world_came
     if (depth == 0.0F || (is_inpainted && point.provenance != Provenance::kInpainted)) continue;
     Votes& votes = is_inpainted ? inpainted_votes_[i] : votes_[i];
     const float cosine = std::abs((camera_from_world.rotation * point.normal).dot(at)) / at.norm();
-    const auto sigma = static_cast<float>(noise_.sigma_of_depth(static_cast<double>(depth)));
+    const auto sigma = static_cast<float>(noise.sigma(static_cast<double>(depth)));
     const float tolerance = kDeviations * sigma + voxel_size_ / std::max(cosine, kFlattest);
     if (depth - at.z() > tolerance) {
       votes.through += 1.0F / sigma;

@@ -73,6 +73,7 @@ DynamicObjects DynamicObjectDetector::detect(const Frame& frame, const cv::Mat& 
   if (examine_geometry && (options.depth_consistency || options.flow)) add_unlabelled(scene);
   DynamicObjects dynamic_objects = compose_masks(scene);
   mask_ = dynamic_objects.mask;
+  still_ = dynamic_objects.still;
   return dynamic_objects;
 }
 
@@ -239,6 +240,30 @@ void DynamicObjectDetector::add_unlabelled(CellScene& scene) {
   }
 }
 
+// The parts of labelled objects that are where they were a second ago, or near points at rest, and far from
+// points that move. Some of the surface of a person who walks slowly is among them. mask: of removed pixels.
+cv::Mat DynamicObjectDetector::still_part(const CellScene& scene, const cv::Mat& mask) const {
+  constexpr double kLongAgo = 1.0;  // seconds
+  constexpr int kNear = 2;          // cells around a point at rest
+  constexpr int kClear = 5;         // cells around a moving point
+  cv::Mat still = scene.depth_evidence.static_for >= kLongAgo;
+  still &= scene.cells_that_are(MotionEvidence::kStatic);
+  for (const auto& point : scene.flow.at_rest)
+    cv::circle(still, grid_.cell_of(point), kNear, 255, cv::FILLED);
+  for (const auto& point : scene.flow.moving) cv::circle(still, grid_.cell_of(point), kClear, 0, cv::FILLED);
+  cv::Mat labelled = cv::Mat::zeros(grid_.size(), CV_8UC1);
+  for (std::size_t i = 0; i < object_tracker_.objects().size(); ++i) {
+    if (object_tracker_.objects()[i].kind != Movable::kUnknown)
+      labelled |= scene.owners == static_cast<int>(i) + 1;
+  }
+  still &= labelled & ~scene.moving;
+  if (cv::countNonZero(still) == 0) return {};
+  const cv::Rect all({0, 0}, grid_.size());
+  cv::Mat pixels = cv::Mat::zeros(mask.size(), CV_8UC1);
+  grid_.in_pixels(still, all).copyTo(pixels(grid_.pixels_of(all)));
+  return pixels & mask;
+}
+
 DynamicObjects DynamicObjectDetector::compose_masks(const CellScene& scene) {
   DynamicObjects dynamic_objects;
   dynamic_objects.T_camera_world = pose_from_flow_;
@@ -286,12 +311,12 @@ DynamicObjects DynamicObjectDetector::compose_masks(const CellScene& scene) {
   dilated(part, margin).copyTo(part);
   dynamic_objects.mask = mask;
   dynamic_objects.resting = resting;
+  dynamic_objects.still = still_part(scene, mask);
   return dynamic_objects;
 }
 
 void DynamicObjectDetector::set_depth_noise(const DepthNoise& noise) {
-  const DepthNoise least = settings_.noise.depth_noise();
-  const DepthNoise used{std::max(noise.constant, least.constant), std::max(noise.growth, least.growth)};
+  const DepthNoise used = settings_.noise.at_least(noise);
   flow_.set_depth_noise(used);
   history_.set_depth_noise(used);
 }
@@ -321,7 +346,8 @@ void DynamicObjectDetector::remember(const std::optional<SE3>& T_camera_world,
   current_.T_camera_world = T_camera_world;
   for (Corner& corner : current_.corners) {
     const cv::Point pixel(static_cast<int>(corner.pixel.x), static_cast<int>(corner.pixel.y));
-    corner.is_removed = !mask_.empty() && mask_.at<std::uint8_t>(pixel) != 0;
+    const bool is_still = !still_.empty() && still_.at<std::uint8_t>(pixel) != 0;
+    corner.is_removed = !mask_.empty() && mask_.at<std::uint8_t>(pixel) != 0 && !is_still;
   }
   corners_.replenish(current_.corners, points, false);
   corners_.replenish(current_.corners, removed_points, true);

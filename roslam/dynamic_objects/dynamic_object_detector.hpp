@@ -83,6 +83,7 @@ class DynamicObjectDetector {
   void assess_objects(CellScene& scene);
   void add_unlabelled(CellScene& scene);
   DynamicObjects compose_masks(const CellScene& scene);
+  cv::Mat still_part(const CellScene& scene, const cv::Mat& mask) const;
   const PastFrame* past_frame(std::size_t index) const;
   const PastFrame* flow_reference() const;
 
@@ -96,6 +97,7 @@ class DynamicObjectDetector {
   PastFrame current_;
   CellImages cells_;                   // of the current frame
   cv::Mat mask_;                       // of the current frame; empty = nothing is removed
+  cv::Mat still_;                      // likewise
   std::optional<SE3> pose_from_flow_;  // of the current frame
   std::deque<PastFrame> past_;
   std::optional<std::size_t> labelled_index_;  // of the newest frame whose labels were used

@@ -32,6 +32,7 @@ void DynamicObjectOptions::validate() const {
   require(growth >= 0.0 && growth <= 100.0, "growth must be 0 to 100 metres");
   require(edge_band >= 0 && edge_band <= 200, "edge_band must be 0 to 200 pixels");
   require(margin >= 0 && margin <= 200, "margin must be 0 to 200 pixels");
+  require(resting_weight >= 0.0 && resting_weight <= 1.0, "resting_weight must be 0 to 1");
   require(scarce_points >= 0, "scarce_points must not be negative");
 }
 
@@ -65,9 +66,11 @@ std::optional<DynamicObjectOptions> options_of_mode(std::string_view mode, const
   options.flow = found->flow;
   if (mode == "ds-slam-like") {
     options.keep_resting = true;
+    options.resting_weight = 0.0;
     options.refine = false;
   } else if (mode == "dynaslam-like") {
     options.min_confidence = 0.0;
+    options.resting_weight = 0.0;
     options.scarce_points = 0;
   }
   return options;

@@ -41,8 +41,9 @@ struct ROSLAM_EXPORT DynamicObjectOptions {
   int edge_band = 10;    ///< pixels around the border of a mask within which depth decides
   int margin = 4;        ///< pixels by which the finished mask is dilated
 
-  // When dynamic objects fill the image.
-  int scarce_points = 100;  ///< static points below which those on objects at rest are used for tracking
+  // Points on labelled objects at rest, never mapped.
+  double resting_weight = 0.5;  ///< of their errors in the pose, in that of others; 0: they are not used
+  int scarce_points = 100;      ///< static points below which those on objects at rest are used for tracking
 
   /// Throws OptionsError naming the field.
   void validate() const;

@@ -15,6 +15,7 @@ namespace roslam {
 struct ROSLAM_EXPORT DynamicObjects {
   cv::Mat mask;     ///< CV_8UC1, nonzero where no feature is extracted (eq. 11); empty = nothing is removed
   cv::Mat resting;  ///< CV_8UC1, nonzero on movable objects at rest, a part of mask; empty = none
+  cv::Mat still;    ///< likewise, on parts of labelled objects that geometry sees without motion now
   std::vector<MovableObject> objects;   ///< the objects in the mask, not dilated
   bool is_everything_labelled = false;  ///< the newest labels were not used: nearly everything is movable
   int label_age = -1;                   ///< frames since the labelled frame; -1 = none so far

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "roslam/common/export.hpp"
@@ -26,6 +27,12 @@ struct ROSLAM_EXPORT MeasurementNoise {
   /// This model, with what is known of the noise of an image.
   MeasurementNoise known_of(const std::optional<double>& pixels,
                             const std::optional<DepthNoise>& depth) const;
+
+  /// The larger of assumed and estimated depth noise: for tests whose tolerance has to cover errors of poses
+  /// as well.
+  DepthNoise at_least(const DepthNoise& estimated) const {
+    return {std::max(depth_sigma, estimated.constant), std::max(depth_sigma_growth, estimated.growth)};
+  }
 
   DepthNoise depth_noise() const { return {depth_sigma, depth_sigma_growth}; }
   double sigma_of_depth(double depth) const { return depth_noise().sigma(depth); }

@@ -30,11 +30,12 @@ double huber(double squared, double limit) {
 }
 
 // Adds one measurement; T_camera_world is perturbed from the left.
-void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, NormalEquations& system) {
+void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, double weight,
+         NormalEquations& system) {
   const double limit = chi_squared_limit(term.measurement);
   if (point_camera.z() <= kMinDepth) {
     // No pose is better for moving a point behind the camera: it costs what an outlier does.
-    system.cost += huber(outlier_limit(term.measurement), limit);
+    system.cost += weight * huber(outlier_limit(term.measurement), limit);
     return;
   }
   const Eigen::Vector3d error = term.error(point_camera);
@@ -43,17 +44,17 @@ void add(const ReprojectionError& term, const Eigen::Vector3d& point_camera, Nor
   jacobian.leftCols<3>() = by_point;
   jacobian.rightCols<3>() = -by_point * skew(point_camera);
   const double squared = error.squaredNorm();
-  const double weight = squared > limit ? std::sqrt(limit / squared) : 1.0;
+  system.cost += weight * huber(squared, limit);
+  if (squared > limit) weight *= std::sqrt(limit / squared);
   system.hessian.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose(), weight);
   system.gradient.noalias() += weight * jacobian.transpose() * error;
   system.weighted += weight * squared;
-  system.cost += huber(squared, limit);
 }
 
 // The inverse of the information of the inliers, times the variance of unit weight.
-Matrix6d covariance_of(const NormalEquations& system, std::size_t rows) {
+Matrix6d covariance_of(const NormalEquations& system, double rows) {
   constexpr double kLeastScale = 0.05;  // of few measurements that happen to agree
-  const double freedom = std::max(1.0, static_cast<double>(rows) - 6.0);
+  const double freedom = std::max(1.0, rows - 6.0);
   const Matrix6d information = system.hessian.selfadjointView<Eigen::Lower>();
   const Matrix6d inverse = information.ldlt().solve(Matrix6d::Identity());
   return std::max(kLeastScale, system.weighted / freedom) * 0.5 * (inverse + inverse.transpose());
@@ -66,6 +67,7 @@ double scale_of_pixel_errors(const Camera& camera, const Measurements& measureme
   std::vector<double> errors;
   errors.reserve(measurements.size());
   for (const PoseMeasurement& m : measurements) {
+    if (m.weight < 1.0) continue;
     const Eigen::Vector3d point = T_camera_world * m.point_world;
     if (point.z() <= kMinDepth) continue;
     errors.push_back(m.measurement.pixel_weight * (camera.project(point) - m.measurement.pixel).norm());
@@ -77,7 +79,8 @@ NormalEquations linearise(const Camera& camera, const Measurements& measurements
   NormalEquations system;
   for (std::size_t i = 0; i < measurements.size(); ++i) {
     if (!pose.is_inlier[i]) continue;
-    add({camera, measurements[i].measurement}, pose.T_camera_world * measurements[i].point_world, system);
+    const auto& [point_world, measurement, weight] = measurements[i];
+    add({camera, measurement}, pose.T_camera_world * point_world, weight, system);
   }
   system.hessian.diagonal().array() += 1e-9;  // keeps a degenerate system solvable
   return system;
@@ -143,9 +146,10 @@ OptimisedPose optimise_pose(const Camera& camera, const std::vector<PoseMeasurem
   }
   if (result.inliers < 3 || !result.T_camera_world.is_finite()) return failed;
   result.pixel_error_scale = scale_of_pixel_errors(camera, measurements, result.T_camera_world);
-  std::size_t rows = 0;
+  double rows = 0.0;
   for (std::size_t i = 0; i < measurements.size(); ++i) {
-    if (result.is_inlier[i]) rows += measurements[i].measurement.has_depth() ? 3 : 2;
+    if (result.is_inlier[i])
+      rows += measurements[i].weight * (measurements[i].measurement.has_depth() ? 3.0 : 2.0);
   }
   result.covariance = covariance_of(linearise(camera, measurements, result), rows);
   return result;

@@ -15,6 +15,7 @@ namespace roslam {
 struct PoseMeasurement {
   Eigen::Vector3d point_world = Eigen::Vector3d::Zero();  ///< metres
   Measurement measurement;
+  double weight = 1.0;  ///< factor of its information, 0 to 1
 };
 
 struct OptimisedPose {
@@ -22,8 +23,8 @@ struct OptimisedPose {
   std::vector<bool> is_inlier;  ///< one per measurement
   int inliers = 0;
 
-  /// Standard deviation of the pixel errors of all measurements, inliers or not, in the sigmas assumed; by
-  /// their median. 1 if the noise model is right; 0 if there is no pose.
+  /// Standard deviation of the pixel errors of all measurements of full weight, inliers or not, in the sigmas
+  /// assumed; by their median. 1 if the noise model is right; 0 if there is no pose.
   double pixel_error_scale = 0.0;
 
   /// Of the pose, perturbed from the left: T = exp(x) T_camera_world with x = (translation m, rotation rad)

@@ -147,39 +147,54 @@ std::vector<cv::KeyPoint> OrbExtractor::corners(const cv::Mat& level_image) cons
 }
 
 std::vector<cv::KeyPoint> OrbExtractor::detect(const std::vector<cv::Mat>& pyramid, const cv::Mat& mask,
-                                               std::vector<cv::Point2f>* removed) const {
+                                               const cv::Mat& part, std::vector<cv::Point2f>* removed) const {
   std::vector<cv::KeyPoint> all;
-  const double masked_share =
-      mask.empty() ? 0.0 : static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
+  const auto share_of = [](const cv::Mat& set) {
+    return set.empty() ? 0.0 : static_cast<double>(cv::countNonZero(set)) / static_cast<double>(set.total());
+  };
+  const double masked_share = share_of(mask);
+  const double part_share = share_of(part);
   int surplus = 0;  // quota that finer levels could not fill, passed on to coarser ones
   for (std::size_t level = 0; level < pyramid.size(); ++level) {
-    const ToFullImage to_full_image(pyramid.front().size(), pyramid[level].size());
+    const cv::Size size = pyramid[level].size();
+    const ToFullImage to_full_image(pyramid.front().size(), size);
+    const auto is_clear_of = [&](const cv::Mat& set, const cv::KeyPoint& p) {
+      const cv::Point2f pixel = to_full_image(p.pt);
+      return set.at<uchar>(cvRound(pixel.y), cvRound(pixel.x)) == 0;
+    };
     auto points = corners(pyramid[level]);
     if (!mask.empty()) {
-      const auto masked = std::stable_partition(points.begin(), points.end(), [&](const cv::KeyPoint& p) {
-        const cv::Point2f pixel = to_full_image(p.pt);
-        return mask.at<uchar>(cvRound(pixel.y), cvRound(pixel.x)) == 0;
-      });
-      if (removed != nullptr) {
-        std::vector<cv::KeyPoint> rejected(masked, points.end());
-        const int share = static_cast<int>(std::lround(masked_share * quotas_[level]));
-        if (share > 0) {
-          for (const auto& p : spread(rejected, pyramid[level].size(), share))
-            removed->push_back(to_full_image(p.pt));
-        }
-      }
+      const auto masked = std::stable_partition(points.begin(), points.end(),
+                                                [&](const cv::KeyPoint& p) { return is_clear_of(mask, p); });
+      std::vector<cv::KeyPoint> rejected(masked, points.end());
       points.erase(masked, points.end());
+      if (const int share = static_cast<int>(std::lround(part_share * quotas_[level])); share > 0) {
+        auto usable = rejected;
+        std::erase_if(usable, [&](const cv::KeyPoint& p) { return is_clear_of(part, p); });
+        finish(spread(usable, size, share), pyramid[level], level, true, all);
+      }
+      const int share = static_cast<int>(std::lround(masked_share * quotas_[level]));
+      if (removed != nullptr && share > 0) {
+        for (const auto& p : spread(rejected, size, share)) removed->push_back(to_full_image(p.pt));
+      }
     }
     const int wanted = quotas_[level] + surplus;
-    points = spread(points, pyramid[level].size(), wanted);
+    points = spread(points, size, wanted);
     surplus = wanted - static_cast<int>(points.size());
-    for (auto& point : points) {
-      point.angle = orientation(pyramid[level], point.pt, circle_);
-      point.octave = static_cast<int>(level);
-      all.push_back(point);
-    }
+    finish(std::move(points), pyramid[level], level, false, all);
   }
   return all;
+}
+
+// Adds points of a level, with their orientation.
+void OrbExtractor::finish(std::vector<cv::KeyPoint> points, const cv::Mat& image, std::size_t level,
+                          bool is_in_part, std::vector<cv::KeyPoint>& all) const {
+  for (auto& point : points) {
+    point.angle = orientation(image, point.pt, circle_);
+    point.octave = static_cast<int>(level);
+    point.class_id = is_in_part ? 1 : 0;
+    all.push_back(point);
+  }
 }
 
 cv::Mat OrbExtractor::forbidden(const cv::Mat& mask) const {
@@ -189,7 +204,7 @@ cv::Mat OrbExtractor::forbidden(const cv::Mat& mask) const {
   return wider;
 }
 
-std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat& mask,
+std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat& mask, const cv::Mat& part,
                                               std::vector<cv::Point2f>* removed) const {
   if (grey.empty() || grey.type() != CV_8UC1) throw InputError("ORB extraction needs an 8-bit grey image");
   if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
@@ -203,7 +218,7 @@ std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat
     cv::resize(pyramid.back(), smaller, size, 0, 0, cv::INTER_LINEAR);
     pyramid.push_back(smaller);
   }
-  std::vector<cv::KeyPoint> points = detect(pyramid, mask.empty() ? mask : forbidden(mask), removed);
+  std::vector<cv::KeyPoint> points = detect(pyramid, mask.empty() ? mask : forbidden(mask), part, removed);
   std::vector<OrbFeature> features(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto level = static_cast<std::size_t>(points[i].octave);
@@ -214,6 +229,7 @@ std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat
   if (!points.empty()) describer_->compute(grey, points, descriptors);
   for (std::size_t i = 0; i < points.size(); ++i) {
     features[i].level = points[i].octave;
+    features[i].is_in_part = points[i].class_id == 1;
     features[i].angle = points[i].angle;
     std::memcpy(features[i].descriptor.data(), descriptors.ptr(static_cast<int>(i)), sizeof(Descriptor));
   }

@@ -17,6 +17,7 @@ struct ROSLAM_EXPORT OrbFeature {
   int level = 0;       ///< pyramid level it was found on
   float angle = 0.0F;  ///< degrees, orientation of the patch
   Descriptor descriptor{};
+  bool is_in_part = false;  ///< as extract() says
 };
 
 /// Extracts ORB features (Rublee et al. 2011): FAST corners on an image pyramid, oriented by the intensity
@@ -33,7 +34,14 @@ class ROSLAM_EXPORT OrbExtractor {
   /// (pixels of the full-size image), about as dense as the points elsewhere. Throws InputError for another
   /// type or a mask of another size.
   std::vector<OrbFeature> extract(const cv::Mat& grey, const cv::Mat& mask = {},
-                                  std::vector<cv::Point2f>* removed = nullptr) const;
+                                  std::vector<cv::Point2f>* removed = nullptr) const {
+    return extract(grey, mask, {}, removed);
+  }
+
+  /// The same with points in a part of the mask as well (CV_8UC1, nonzero there; may be empty), about as
+  /// dense as elsewhere: OrbFeature::is_in_part. The others are those that there would be without it.
+  std::vector<OrbFeature> extract(const cv::Mat& grey, const cv::Mat& mask, const cv::Mat& part,
+                                  std::vector<cv::Point2f>* removed) const;
 
   /// The mask dilated by mask_margin (CV_8UC1): where points are rejected.
   cv::Mat forbidden(const cv::Mat& mask) const;
@@ -47,7 +55,9 @@ class ROSLAM_EXPORT OrbExtractor {
  private:
   // Points in pixels of their levels.
   std::vector<cv::KeyPoint> detect(const std::vector<cv::Mat>& pyramid, const cv::Mat& mask,
-                                   std::vector<cv::Point2f>* removed) const;
+                                   const cv::Mat& part, std::vector<cv::Point2f>* removed) const;
+  void finish(std::vector<cv::KeyPoint> points, const cv::Mat& image, std::size_t level, bool is_in_part,
+              std::vector<cv::KeyPoint>& all) const;
   std::vector<cv::KeyPoint> corners(const cv::Mat& level_image) const;
 
   OrbOptions options_;

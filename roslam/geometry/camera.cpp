@@ -59,6 +59,7 @@ void Camera::validate() const {
   require(depth_units_per_metre == 0.0 || positive(depth_units_per_metre),
           "depth_units_per_metre must be positive, got " + std::to_string(depth_units_per_metre) + "; " +
               std::string(usual_depth_units()));
+  if (imu) imu->validate();
   if (depth_noise) {
     const auto [constant, growth] = *depth_noise;
     require(constant >= 0.0 && constant < 10.0 && growth >= 0.0 && growth < 10.0 && constant + growth > 0.0,

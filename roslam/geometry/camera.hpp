@@ -11,6 +11,7 @@
 
 #include "roslam/common/export.hpp"
 #include "roslam/geometry/depth_noise.hpp"
+#include "roslam/geometry/imu_calibration.hpp"
 
 namespace roslam {
 
@@ -27,6 +28,7 @@ struct ROSLAM_EXPORT Camera {
   double depth_units_per_metre = 0.0;          ///< value of a 16-bit depth image at one metre; 0: not set
   double fps = 30.0;                           ///< frames a second
   std::optional<DepthNoise> depth_noise = {};  ///< if known; where images begin to show it that counts
+  std::optional<ImuCalibration> imu = {};      ///< of the inertial measurement unit fixed to it, if any
 
   /// Throws CalibrationError naming the field that is out of range. depth_units_per_metre may be 0 (not set):
   /// depth in metres needs none, and a source of 16-bit depth refuses it.
@@ -70,7 +72,8 @@ ROSLAM_EXPORT std::optional<Camera> camera_preset(std::string_view name);
 ROSLAM_EXPORT std::string_view usual_depth_units();
 
 /// Reads a camera file (YAML: model, width, height, fx, fy, cx, cy, distortion, depth_units_per_metre, fps,
-/// depth_noise: {constant, growth}); only model, distortion, fps (30) and depth_noise have defaults.
+/// depth_noise: {constant, growth}, imu: {T_camera_imu: 16 numbers, row by row, gyroscope_noise,
+/// gyroscope_walk}); only model, distortion, fps (30), depth_noise and imu have defaults.
 /// distortion: k1 k2 p1 p2 k3, k1 k2 p1 p2, k1 k2, or none. Throws InputError for a missing or malformed file
 /// or an unknown key, CalibrationError as validate does.
 ROSLAM_EXPORT Camera read_camera(const std::filesystem::path& file);

@@ -62,9 +62,9 @@ class CameraFile {
 };
 
 void reject_unknown_keys(const std::filesystem::path& path, const YAML::Node& node) {
-  const std::set<std::string> known{"model",      "width", "height",     "fx",  "fy",
-                                    "cx",         "cy",    "distortion", "fps", "depth_units_per_metre",
-                                    "depth_noise"};
+  const std::set<std::string> known{"model",       "width", "height",     "fx",  "fy",
+                                    "cx",          "cy",    "distortion", "fps", "depth_units_per_metre",
+                                    "depth_noise", "imu"};
   std::set<std::string> seen;
   for (const auto& entry : node) {
     if (!entry.first.IsScalar())
@@ -75,7 +75,7 @@ void reject_unknown_keys(const std::filesystem::path& path, const YAML::Node& no
       throw InputError(path.string() + ": '" + key + "' is given twice; remove one");
     if (!known.contains(key)) {
       throw InputError(path.string() + ": unknown key '" + key + "'; known: model width height fx fy cx cy " +
-                       "distortion depth_units_per_metre fps depth_noise");
+                       "distortion depth_units_per_metre fps depth_noise imu");
     }
   }
 }
@@ -86,6 +86,45 @@ DepthNoise depth_noise_of(const std::filesystem::path& path, const YAML::Node& n
     throw InputError(path.string() + ": depth_noise must be {constant: METRES, growth: PER_METRE}");
   const CameraFile read(path, node);
   return {read.get<double>("constant"), read.get<double>("growth")};
+}
+
+ImuCalibration imu_of(const std::filesystem::path& path, const YAML::Node& node) {
+  const std::string form =
+      ": imu must be {T_camera_imu: [16 numbers], gyroscope_noise: RAD/S/SQRT(HZ), "
+      "gyroscope_walk: RAD/S^2/SQRT(HZ)}";
+  if (!node.IsMap()) throw InputError(path.string() + form);
+  ImuCalibration imu;
+  for (const auto& entry : node) {
+    const auto key = entry.first.as<std::string>("");
+    if (key != "T_camera_imu" && key != "gyroscope_noise" && key != "gyroscope_walk")
+      throw InputError(path.string() + form + ", and has '" + key + "'");
+  }
+  const CameraFile read(path, node);
+  const auto values = read.get<std::vector<double>>("T_camera_imu");
+  if (values.size() != 16) throw InputError(path.string() + form);
+  const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
+  const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
+  constexpr double kRounding = 1e-3;
+  const bool is_rigid = (R * R.transpose()).isIdentity(kRounding) && R.determinant() > 0.0 &&
+                        T.row(3).isApprox(Eigen::RowVector4d::Unit(3));
+  if (!is_rigid)
+    throw CalibrationError(path.string() +
+                           ": imu.T_camera_imu is no rigid transform; give the 4x4 matrix "
+                           "row by row, whose last row is 0 0 0 1");
+  imu.T_camera_imu = SE3(R, T.topRightCorner<3, 1>());
+  imu.gyroscope_noise = read.get<double>("gyroscope_noise", imu.gyroscope_noise);
+  imu.gyroscope_walk = read.get<double>("gyroscope_walk", imu.gyroscope_walk);
+  return imu;
+}
+
+void write(YAML::Emitter& out, const ImuCalibration& imu) {
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> T = imu.T_camera_imu.matrix();
+  out << YAML::Key << "imu" << YAML::Value << YAML::BeginMap;
+  out << YAML::Key << "T_camera_imu" << YAML::Value << YAML::Flow
+      << std::vector<double>(T.data(), T.data() + T.size());
+  out << YAML::Key << "gyroscope_noise" << YAML::Value << imu.gyroscope_noise;
+  out << YAML::Key << "gyroscope_walk" << YAML::Value << imu.gyroscope_walk;
+  out << YAML::EndMap;
 }
 }  // namespace
 
@@ -136,6 +175,7 @@ Camera read_camera(const std::filesystem::path& file) {
   }
   camera.fps = read.get<double>("fps", camera.fps);
   if (node["depth_noise"]) camera.depth_noise = depth_noise_of(file, node["depth_noise"]);
+  if (node["imu"]) camera.imu = imu_of(file, node["imu"]);
   try {
     camera.validate();
   } catch (const CalibrationError& error) {
@@ -169,6 +209,7 @@ std::string camera_to_yaml(const Camera& camera) {
         << "constant" << YAML::Value << camera.depth_noise->constant << YAML::Key << "growth" << YAML::Value
         << camera.depth_noise->growth << YAML::EndMap;
   }
+  if (camera.imu) write(out, *camera.imu);
   out << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
 }

@@ -9,7 +9,8 @@
 
 namespace roslam {
 
-/// Submap of a keyframe and its pose in the world frame of that submap.
+/// Submap of a keyframe and its pose in the world frame of that submap. No submap: the keyframe was
+/// withdrawn, as its pose is wrong.
 struct KeyframePose {
   SubmapId submap;
   SE3 T_world_camera;

@@ -10,6 +10,7 @@ namespace roslam {
 
 namespace {
 KeyframePose pose_of(const Map& map, KeyframeId id) {
+  if (map.is_withdrawn(id)) return {};
   const auto [anchor, T_camera_anchor] = map.T_camera_anchor(id);
   const Keyframe& keyframe = *map.find(anchor);
   return {keyframe.submap, (T_camera_anchor * keyframe.T_camera_world).inverse()};

@@ -188,6 +188,23 @@ void Map::remove_keyframe(KeyframeId id, KeyframeId anchor) {
   --keyframe_count_;
 }
 
+void Map::withdraw(KeyframeId id) {
+  withdrawn_.insert(id);
+  std::erase_if(loops_, [&](const LoopClosure& loop) { return loop.from == id || loop.to == id; });
+}
+
+void Map::remove_withdrawn(KeyframeId id) {
+  const Keyframe* keyframe = find(id);
+  if (keyframe == nullptr) return;
+  // The newest before it: the frames that refer to it are of its time.
+  for (std::uint32_t i = static_cast<std::uint32_t>(keyframes_.size()); i-- > 0;) {
+    const Keyframe* other = find(KeyframeId{i});
+    const bool is_usable = other != nullptr && i != id.value && other->submap == keyframe->submap &&
+                           !is_withdrawn(KeyframeId{i});
+    if (is_usable) return remove_keyframe(id, KeyframeId{i});
+  }
+}
+
 void Map::merge_landmarks(LandmarkId from, LandmarkId into) {
   Landmark* source = find(from);
   Landmark* target = find(into);

@@ -97,6 +97,14 @@ class ROSLAM_EXPORT Map {
   /// frames that refer to it can still be computed.
   void remove_keyframe(KeyframeId keyframe, KeyframeId anchor);
 
+  /// Marks a keyframe whose pose turned out to be wrong: nothing may be computed from it any more. Its loops
+  /// are forgotten.
+  void withdraw(KeyframeId keyframe);
+  bool is_withdrawn(KeyframeId keyframe) const { return withdrawn_.contains(keyframe); }
+
+  /// Removes a withdrawn keyframe. It stays if it is the only one of its submap.
+  void remove_withdrawn(KeyframeId keyframe);
+
   /// Moves all observations of one landmark to another and removes the first.
   void merge_landmarks(LandmarkId from, LandmarkId into);
 
@@ -192,6 +200,7 @@ class ROSLAM_EXPORT Map {
   };
   std::vector<float> scales_;
   std::vector<std::unique_ptr<Keyframe>> keyframes_;  // by id; empty once removed
+  std::set<KeyframeId> withdrawn_;
   std::vector<Anchor> anchors_;                       // by keyframe id; set for removed keyframes
   std::vector<std::unique_ptr<Landmark>> landmarks_;  // by id; empty once removed
   std::vector<LandmarkId> merged_into_;               // by landmark id

@@ -47,6 +47,7 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("dynamic_objects", "growth", o.dynamic_objects.growth);
   visit("dynamic_objects", "edge_band", o.dynamic_objects.edge_band);
   visit("dynamic_objects", "margin", o.dynamic_objects.margin);
+  visit("dynamic_objects", "resting_weight", o.dynamic_objects.resting_weight);
   visit("dynamic_objects", "scarce_points", o.dynamic_objects.scarce_points);
   visit("matcher", "max_distance", o.matcher.max_distance);
   visit("matcher", "strict_distance", o.matcher.strict_distance);
@@ -71,11 +72,15 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("tracker", "hidden_share", o.tracker.hidden_share);
   visit("tracker", "max_predicted", o.tracker.max_predicted);
   visit("tracker", "max_wait_to_start", o.tracker.max_wait_to_start);
+  visit("tracker", "use_gyroscope", o.tracker.use_gyroscope);
   visit("tracker", "recently_lost_frames", o.tracker.recently_lost_frames);
   visit("tracker", "new_submap_after_lost", o.tracker.new_submap_after_lost);
   visit("plausible", "min_found_share", o.plausible.min_found_share);
   visit("plausible", "poor_found_share", o.plausible.poor_found_share);
   visit("plausible", "max_pixel_error", o.plausible.max_pixel_error);
+  visit("plausible", "max_position_sigma", o.plausible.max_position_sigma);
+  visit("plausible", "max_rotation_sigma", o.plausible.max_rotation_sigma);
+  visit("plausible", "constrained_sigma", o.plausible.constrained_sigma);
   visit("plausible", "max_speed", o.plausible.max_speed);
   visit("plausible", "max_acceleration", o.plausible.max_acceleration);
   visit("plausible", "max_turn_rate", o.plausible.max_turn_rate);

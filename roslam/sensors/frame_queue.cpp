@@ -6,6 +6,14 @@
 
 namespace roslam {
 
+// What dropped frames carry of the time between images goes to the next.
+void FrameQueue::drop_front(std::deque<Waiting>& queue, Frame& next) {
+  Frame& dropped = queue.front().frame;
+  if (dropped.segment == next.segment) prepend_samples(std::move(dropped.inertial), next.inertial);
+  queue.pop_front();
+  ++dropped_;
+}
+
 void FrameQueue::push(Frame frame) {
   const std::scoped_lock lock(mutex_);
   const std::size_t number = pushed_++;
@@ -15,8 +23,15 @@ void FrameQueue::push(Frame frame) {
   }
   if (queue_.size() >= room_) {
     std::deque<Waiting> kept;
-    for (std::size_t i = 0; i < queue_.size(); i += 2) kept.push_back(std::move(queue_[i]));
-    dropped_ += queue_.size() - kept.size();
+    while (!queue_.empty()) {
+      kept.push_back(std::move(queue_.front()));
+      queue_.pop_front();
+      if (queue_.size() > 1) {
+        drop_front(queue_, queue_[1].frame);
+      } else if (!queue_.empty()) {
+        drop_front(queue_, frame);
+      }
+    }
     queue_ = std::move(kept);
   }
   queue_.push_back({std::move(frame), number});
@@ -28,8 +43,7 @@ std::optional<Frame> FrameQueue::pop() {
   changed_.wait(lock, [&] { return closed_ || !queue_.empty(); });
   if (queue_.empty()) return std::nullopt;
   if (queue_.size() > relaxed_ && !closed_) {
-    queue_.pop_front();
-    ++dropped_;
+    drop_front(queue_, queue_[1].frame);
   }
   Waiting next = std::move(queue_.front());
   queue_.pop_front();

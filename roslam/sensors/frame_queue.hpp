@@ -42,6 +42,8 @@ class FrameQueue {
     std::size_t number;  // of all that were pushed
   };
 
+  void drop_front(std::deque<Waiting>& queue, Frame& next);
+
   std::size_t relaxed_;
   std::size_t room_;
   mutable std::mutex mutex_;

@@ -6,10 +6,12 @@
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "roslam/common/export.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/se3.hpp"
+#include "roslam/sensors/inertial_sample.hpp"
 
 namespace roslam {
 
@@ -21,6 +23,8 @@ struct ROSLAM_EXPORT Frame {
   cv::Mat colour;          ///< CV_8UC3, BGR, raw (distorted)
   cv::Mat depth;           ///< CV_32FC1, metres along the optical axis, 0 = unknown; registered to colour
   cv::Mat labels;          ///< CV_8UC1 class of each pixel if the source knows it, else empty
+  std::vector<InertialSample>
+      inertial;  ///< since the frame before, in order of time; Camera::imu says how fixed
   std::optional<SE3> T_world_camera;  ///< ground truth if the source has it; never used for tracking
 };
 

@@ -105,11 +105,41 @@ void TumSource::open_lists() {
   }
   colour_ = ordered("rgb.txt", "colour image", std::move(colour), skipped_);
   depth_ = ordered("depth.txt", "depth image", std::move(depth), skipped_depth_);
+  open_inertial(unit.seconds);
   const double interval = median_interval(colour_);
   constexpr double kContradiction = 1.5;
   const double fps = interval > 0.0 ? 1.0 / interval : camera_.fps;
   if (fps < camera_.fps * kContradiction && fps > camera_.fps / kContradiction) return;
   ++notes_["the camera has " + in_words(camera_.fps) + " images a second, the timestamps " + in_words(fps)];
+}
+
+// seconds: the unit of the times.
+void TumSource::open_inertial(double seconds) {
+  const auto file = folder_ / "imu.txt";
+  if (!std::filesystem::exists(file)) return;
+  if (!camera_.imu) {
+    ++notes_["imu.txt is not used, as the camera file has no imu"];
+    return;
+  }
+  if (colour_.back().segment > 0) {
+    ++notes_["imu.txt is not used, as the clock restarts"];
+    return;
+  }
+  InertialFile inertial = read_inertial_file(file);
+  count(notes_, "line of imu.txt that is no sample, skipped", inertial.skipped);
+  constexpr double kBefore = 1.0;  // seconds before the first image
+  for (InertialSample& sample : inertial.samples) {
+    sample.timestamp *= seconds;
+    if (sample.timestamp >= colour_.front().timestamp - kBefore) inertial_.push_back(sample);
+  }
+  if (inertial_.empty() || inertial_.front().timestamp > colour_.back().timestamp)
+    ++notes_["imu.txt has no sample in the time of the images; its times must be of their clock and unit"];
+}
+
+// The samples up to the time of a frame.
+void TumSource::take_inertial(Frame& frame) {
+  while (next_inertial_ < inertial_.size() && inertial_[next_inertial_].timestamp <= frame.timestamp)
+    frame.inertial.push_back(inertial_[next_inertial_++]);
 }
 
 // The lines of a list in order.
@@ -179,6 +209,7 @@ std::optional<Frame> TumSource::read(std::size_t index) {
   frame.timestamp = colour_[index].timestamp;
   frame.colour = colour.image;
   frame.depth = read_depth_for(index, colour.image.size());
+  take_inertial(frame);
   return frame;
 }
 

@@ -36,7 +36,8 @@ ROSLAM_EXPORT std::vector<int> associate_by_time(const std::vector<TimedFile>& c
 /// milliseconds, microseconds, nanoseconds or numbers of frames are recognised by the camera's rate and
 /// converted. A colour image without a depth image near in time is returned with an empty depth; images that
 /// are missing, truncated, of the wrong size or without a plausible time are skipped and counted. notes()
-/// tells what was sorted, converted or taken as unknown.
+/// tells what was sorted, converted or taken as unknown. If the folder has imu.txt (see read_inertial_file),
+/// frames carry its samples.
 class ROSLAM_EXPORT TumSource : public FrameSource {
  public:
   /// Throws InputError if the folder or a list is missing, malformed or names no image, or if the clocks of
@@ -66,6 +67,8 @@ class ROSLAM_EXPORT TumSource : public FrameSource {
                                  std::map<std::string, std::size_t>& skipped);
   void pair_with_depth(double max_time_difference);
   std::optional<Frame> read(std::size_t index);
+  void open_inertial(double seconds);
+  void take_inertial(Frame& frame);
   cv::Mat read_depth_for(std::size_t index, const cv::Size& colour_size);
 
   std::filesystem::path folder_;
@@ -80,6 +83,8 @@ class ROSLAM_EXPORT TumSource : public FrameSource {
   int bits_ = 8;                            // of a channel of the colour images so far
   std::size_t saturated_depth_pixels_ = 0;  // taken as unknown
   std::size_t position_ = 0;
+  std::vector<InertialSample> inertial_;
+  std::size_t next_inertial_ = 0;
 };
 
 }  // namespace roslam

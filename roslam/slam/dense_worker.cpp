@@ -141,6 +141,7 @@ void DenseWorker::Impl::fuse(KeyframeId keyframe, const Job& job) {
   DepthKeyframe view = restored != nullptr
                            ? reducer_.reduce(restored->colour, restored->depth, restored->provenance, {})
                            : reducer_.reduce(frame.colour, frame.depth, {}, hidden);
+  view.noise = job.input.depth_noise;
   if (!job.input.labels.empty()) {
     cv::Mat labels = job.input.labels;
     // What could move may since have left, and would give its class to what is behind it.

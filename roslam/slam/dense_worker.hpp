@@ -22,10 +22,11 @@ namespace roslam {
 struct DenseInput {
   Frame frame;  ///< as taken; its images must not be changed afterwards
   DynamicObjects dynamic_objects;
-  cv::Mat labels;                 ///< of this frame or an earlier one, CV_8UC1; empty: none are known
-  SE3 T_labelled_camera;          ///< from the keyframe's camera to the camera that the labels are of
-  bool has_older_labels = false;  ///< the labels are of an earlier frame
-  bool is_restored = false;       ///< comes in two parts: restored() tells of the second
+  cv::Mat labels;                         ///< of this frame or an earlier one, CV_8UC1; empty: none are known
+  SE3 T_labelled_camera;                  ///< from the keyframe's camera to the camera that the labels are of
+  std::optional<DepthNoise> depth_noise;  ///< of the camera, if known
+  bool has_older_labels = false;          ///< the labels are of an earlier frame
+  bool is_restored = false;               ///< comes in two parts: restored() tells of the second
 };
 
 /// Fuses keyframes into a dense map as they come, on a thread of its own at lower priority: the tracker never

@@ -43,16 +43,22 @@ struct ROSLAM_EXPORT FrameResult {
       T_world_camera;  ///< as estimated now; later corrections of the map are in Slam::trajectory()
   Matrix6d covariance = Matrix6d::Zero();  ///< of T_world_camera: (position m, rotation vector rad) in the
                                            ///< world frame, against the origin of the submap
-  SubmapId submap;                         ///< that the pose is in; submaps that overlap are merged later
-  int inliers = 0;                         ///< landmarks that support the pose
-  double quality = 0.0;                    ///< tracking quality, 0 (predicted or unknown) to 1
+  std::vector<Eigen::Vector3d>
+      unconstrained;     ///< directions (world, unit length) along which what is in view
+                         ///< hardly constrains the position, as along a bare corridor
+  SubmapId submap;       ///< that the pose is in; submaps that overlap are merged later
+  int inliers = 0;       ///< landmarks that support the pose
+  double quality = 0.0;  ///< tracking quality, 0 (predicted or unknown) to 1
   bool is_keyframe = false;
+  std::size_t withdrawn = 0;                ///< poses of earlier frames that this one contradicts
+  double withdrawn_after = 0.0;             ///< seconds; of the frames between that time and this one
   std::vector<std::string> warnings;        ///< what is newly doubtful about the input, with the remedy
   bool is_clock_reset = false;              ///< the source's clock was found to have restarted at this frame
   double tracking_seconds = 0.0;            ///< processor time of the tracking thread
   DynamicObjects dynamic_objects;           ///< what was found to move, or may move
   std::vector<cv::Point2f> points;          ///< corners that were used, pixels of the image as taken
-  std::vector<cv::Point2f> removed_points;  ///< corners on dynamic objects, which were not used
+  std::vector<cv::Point2f> removed_points;  ///< corners on dynamic objects; never mapped, and not used but
+                                            ///< for the pose where they show no motion
 
   bool is_used() const { return rejected == RejectReason::kNone; }
 };

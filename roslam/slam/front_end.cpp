@@ -92,21 +92,31 @@ DynamicObjects FrontEnd::detect(const Frame& frame, const cv::Mat& grey,
 
 void FrontEnd::extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& mask, std::size_t frame_count,
                        FrontEndResult& result) {
-  cv::Mat forbidden = result.dynamic_objects.mask;
-  // Where few static points are left, movable objects at rest are used for this frame.
+  const DynamicObjects& objects = result.dynamic_objects;
+  // Where few static points are left, those on objects that rested for long count like them. What shows no
+  // motion now serves the pose.
   const bool is_scarce = frame_count > 0 && last_inliers_ < options_.dynamic_objects.scarce_points;
-  const cv::Mat resting = is_scarce ? result.dynamic_objects.resting : cv::Mat();
+  const cv::Mat resting = is_scarce ? objects.resting : cv::Mat();
+  cv::Mat still = options_.dynamic_objects.resting_weight > 0.0 ? objects.still : cv::Mat();
+  cv::Mat forbidden = objects.mask;
   if (!resting.empty()) forbidden = forbidden & ~resting;
-  if (!mask.empty()) forbidden = forbidden.empty() ? mask : cv::Mat(forbidden | mask);
-  const auto features = extractor_.extract(grey, forbidden, &result.removed_points);
-  for (const auto& feature : features) result.points.push_back(feature.pixel);
+  if (!mask.empty()) {
+    forbidden = forbidden.empty() ? mask : cv::Mat(forbidden | mask);
+    if (!still.empty()) still = still & ~(mask != 0);
+  }
+  const auto features = extractor_.extract(grey, forbidden, still, &result.removed_points);
+  for (const auto& feature : features) {
+    if (!feature.is_in_part) result.points.push_back(feature.pixel);
+  }
   auto view = std::make_shared<ObservedFrame>(
       roslam::observe(features, frame.colour, frame.depth, camera_, options_.depth));
-  if (!resting.empty()) {
+  if (!resting.empty() || !still.empty()) {
     for (const auto& feature : features) {
-      const cv::Point pixel(std::min(cvRound(feature.pixel.x), resting.cols - 1),
-                            std::min(cvRound(feature.pixel.y), resting.rows - 1));
-      view->is_movable.push_back(resting.at<std::uint8_t>(pixel) != 0);
+      const cv::Point pixel(std::min(cvRound(feature.pixel.x), grey.cols - 1),
+                            std::min(cvRound(feature.pixel.y), grey.rows - 1));
+      const bool has_rested = !feature.is_in_part && !resting.empty() && resting.at<std::uint8_t>(pixel) != 0;
+      view->is_movable.push_back(feature.is_in_part || has_rested);
+      result.rested.push_back(has_rested ? 1 : 0);
     }
   }
   noise_.note_in(*view);
@@ -146,6 +156,11 @@ void FrontEnd::remember(const TrackedFrame& frame, const Map& map, const FrontEn
   if (detects())
     detector_.remember(is_measured ? frame.T_camera_world : std::nullopt, observation.points,
                        observation.removed_points);
+}
+
+void FrontEnd::forget_poses() {
+  detector_.leave_submap();
+  noise_.interrupt();
 }
 
 void FrontEnd::reset() {

@@ -29,11 +29,12 @@ namespace roslam {
 struct FrontEndResult {
   DynamicObjects dynamic_objects;
   std::shared_ptr<const ObservedFrame> view;
-  std::vector<cv::Point2f> points;          ///< corners that were used, pixels of the image as taken
-  std::vector<cv::Point2f> removed_points;  ///< corners on dynamic objects
+  std::vector<cv::Point2f> points;          ///< as FrameResult
+  std::vector<cv::Point2f> removed_points;  ///< as FrameResult
   std::vector<std::string> warnings;        ///< as FrameResult::warnings
   double hidden_share = 0.0;                ///< of the image, covered by dynamic objects
-  bool may_start = true;                    ///< as FrameHint::may_start
+  std::vector<std::uint8_t> rested;         ///< as FrameHint
+  bool may_start = true;                    ///< as FrameHint
   double detection_seconds = 0.0;           ///< processor time
   double extraction_seconds = 0.0;          ///< processor time
 };
@@ -67,6 +68,9 @@ class FrontEnd {
 
   /// Ends a wait for labels; there are none any more. May be called from any thread.
   void cancel() { segmentation_.cancel(); }
+
+  /// To be called when poses of earlier frames turned out to be wrong.
+  void forget_poses();
 
   /// Forgets earlier frames, as after a reset of the source's clock.
   void reset();

@@ -57,6 +57,7 @@ void RestorationWorker::restore(KeyframeId keyframe, const Job& job) {
   const std::vector<KeyframePose> poses = pose_lookup_(ids);
   const auto sources = move_sources(ids, poses);
   const KeyframePose& pose = poses.back();
+  if (!pose.submap.is_valid()) return leave(keyframe);  // withdrawn
   const PosedImage view{job.frame.timestamp, pose.T_world_camera, job.frame.colour, job.frame.depth,
                         removed_area(job.dynamic_objects, job.frame.colour.size(), options_.margin)};
   const auto keep = [&] {

@@ -13,7 +13,9 @@ namespace roslam {
 // What each component takes of the options.
 
 inline Tracker::Settings tracker_settings(const Options& o) {
-  return {o.tracker, o.plausible, o.matcher, o.pose, o.local_map, o.geometric_verifier, o.relocaliser, o.noise};
+  return {o.tracker,     o.plausible, o.matcher,
+          o.pose,        o.local_map, o.geometric_verifier,
+          o.relocaliser, o.noise,     o.dynamic_objects.resting_weight};
 }
 
 inline DynamicObjectDetector::Settings detector_settings(const Options& o) {

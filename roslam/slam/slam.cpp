@@ -126,7 +126,11 @@ std::map<std::string, std::size_t> Slam::gave_way() const { return impl_->load.f
 
 std::map<std::string, std::string> Slam::backends() const { return impl_->backends; }
 
-std::map<std::string, std::size_t> Slam::warnings() const { return impl_->front_end.warnings(); }
+std::map<std::string, std::size_t> Slam::warnings() const {
+  auto warnings = impl_->front_end.warnings();
+  if (impl_->warned_of_gyroscope) warnings[kGyroscopeContradicts] = 1;
+  return warnings;
+}
 
 const Camera& Slam::camera() const { return impl_->camera; }
 const Options& Slam::options() const { return impl_->options; }
@@ -137,12 +141,19 @@ const std::map<TrackingState, std::size_t>& Slam::frames_by_state() const { retu
 const std::map<RejectReason, std::size_t>& Slam::rejected() const { return impl_->log.rejected(); }
 std::size_t Slam::clock_resets() const { return impl_->log.clock_resets(); }
 
+std::size_t Slam::withdrawn_poses() const { return impl_->log.withdrawn(); }
+
 MeasurementNoise Slam::measurement_noise() const { return impl_->front_end.noise().of_features(); }
 
 std::map<std::string, std::size_t> Slam::doubted_poses() const {
   std::map<std::string, std::size_t> doubted;
   for (const auto& [doubt, count] : impl_->tracker.doubts()) doubted[std::string(describe(doubt))] = count;
   return doubted;
+}
+
+std::optional<GyroscopeState> Slam::gyroscope() const {
+  const auto& gyroscope = impl_->tracker.gyroscope();
+  return gyroscope ? std::make_optional(gyroscope->state()) : std::nullopt;
 }
 
 StageTimes Slam::times() const {

@@ -144,8 +144,14 @@ class ROSLAM_EXPORT Slam {
   /// inliers). Another pose may have been found for the same frame.
   std::map<std::string, std::size_t> doubted_poses() const;
 
+  /// Frames whose poses were given out and withdrawn, as a later frame contradicted them.
+  std::size_t withdrawn_poses() const;
+
   /// The noise of features as it is now assumed or estimated (MeasurementNoise::estimate).
   MeasurementNoise measurement_noise() const;
+
+  /// The gyroscope by the images so far; nothing if Camera::imu is not set.
+  std::optional<GyroscopeState> gyroscope() const;
 
   /// Processor time of every stage so far.
   StageTimes times() const;

@@ -66,6 +66,8 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   if (!options.keyframes.enabled && map.keyframe_count() == 0)
     result.rejected = RejectReason::kNoMapToLocaliseIn;
   result.state = tracker.state();
+  if (verdict.is_clock_reset) restart_clock(frame.timestamp);
+  tracker.add_inertial(frame.inertial, frame.timestamp);
   if (!result.is_used()) {
     log.add_rejected(result.rejected);
     return result;
@@ -73,20 +75,24 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   const Stopwatch watch;
   const auto begun = std::chrono::steady_clock::now();
   result.is_clock_reset = verdict.is_clock_reset;
-  if (verdict.is_clock_reset) restart_clock(frame.timestamp);
   FrontEndResult observation = front_end.observe(frame, mask, predict_pose(frame.timestamp), log.frames());
   result.dynamic_objects = std::move(observation.dynamic_objects);
   result.warnings = std::move(observation.warnings);
 
   std::unique_lock map_lock(map_mutex);
-  FrameHint hint{result.dynamic_objects.T_camera_world, observation.hidden_share, frame.depth,
-                 observation.may_start, [&] { return similar_keyframes(*observation.view); }};
+  FrameHint hint{result.dynamic_objects.T_camera_world,
+                 observation.hidden_share,
+                 frame.depth,
+                 observation.rested,
+                 observation.may_start,
+                 [&] { return similar_keyframes(*observation.view); }};
   // A pose in the map as it was before a correction is no hint any more.
   if (front_end.follow_corrections(map, tracker.last_pose())) hint.T_camera_world.reset();
   TrackedFrame tracked = tracker.track(observation.view, frame.timestamp, hint);
   tracked.hidden = count_hidden_landmarks(map, tracked, camera, result.dynamic_objects.mask);
   const KeyframeId keyframe = create_keyframe(tracked, frame.index);
   log.add(tracked, frame.index, map);
+  if (tracked.withdrawal) withdraw(*tracked.withdrawal, result);
   log.add_evidence(landmarks_on_objects(map, tracked, camera, result.dynamic_objects.mask, frame.depth));
   front_end.remember(tracked, map, observation, keyframe.is_valid());
   if (tracked.reference.is_valid()) result.submap = map.submap_of(tracked.reference);
@@ -102,12 +108,44 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   result.is_keyframe = keyframe.is_valid();
   if (tracked.T_camera_world) {
     result.T_world_camera = tracked.T_camera_world->inverse();
+    if (tracked.state == TrackingState::kTracking) {
+      for (const auto& d : unconstrained_directions(tracked.measurement_covariance, options.plausible))
+        result.unconstrained.emplace_back(result.T_world_camera->rotation() * d);
+    }
     result.covariance = covariance_in_world(*result.T_world_camera, tracked.covariance);
   }
   result.points = std::move(observation.points);
   result.removed_points = std::move(observation.removed_points);
+  check_gyroscope(result);
+  if (tracked.withdrawal) {
+    for (const KeyframeId wrong : tracked.withdrawal->keyframes) mapping.submit(wrong);
+  }
   if (keyframe.is_valid()) submit(keyframe, frame, result.dynamic_objects);
   return result;
+}
+
+// Called with the map's mutex held. Keyframes are not used from now on; they are removed by the thread that
+// may be working on them.
+void Slam::Impl::withdraw(const Withdrawal& wrong, FrameResult& result) {
+  result.withdrawn = log.withdraw_after(wrong.after);
+  result.withdrawn_after = wrong.after;
+  for (const KeyframeId keyframe : wrong.keyframes) map.withdraw(keyframe);
+  front_end.forget_poses();
+}
+
+// Removes a keyframe whose pose was withdrawn. False if it is one to go on with.
+bool Slam::Impl::remove_withdrawn(KeyframeId keyframe) {
+  const std::scoped_lock lock(map_mutex);
+  if (map.is_withdrawn(keyframe)) map.remove_withdrawn(keyframe);
+  if (needs_poses()) poses.publish(map);
+  return map.is_withdrawn(keyframe) || map.find(keyframe) == nullptr;
+}
+
+void Slam::Impl::check_gyroscope(FrameResult& result) {
+  const auto& gyroscope = tracker.gyroscope();
+  if (warned_of_gyroscope || !gyroscope || gyroscope->agrees_with_images()) return;
+  warned_of_gyroscope = true;
+  result.warnings.emplace_back(kGyroscopeContradicts);
 }
 
 void Slam::Impl::restart_clock(double timestamp) {
@@ -142,7 +180,7 @@ KeyframeId Slam::Impl::create_keyframe(TrackedFrame& tracked, std::size_t frame_
 std::vector<KeyframeId> Slam::Impl::similar_keyframes(const ObservedFrame& view) const {
   std::vector<KeyframeId> result;
   if (!keyframe_database) return result;
-  const auto exists = [this](KeyframeId id) { return map.find(id) != nullptr; };
+  const auto exists = [this](KeyframeId id) { return map.find(id) != nullptr && !map.is_withdrawn(id); };
   for (const auto& found : keyframe_database->similar(keyframe_database->describe(view), exists))
     result.push_back(found.keyframe);
   return result;
@@ -163,6 +201,7 @@ void Slam::Impl::cull_contradicted(const TrackedFrame& tracked, const Frame& fra
 
 void Slam::Impl::map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,
                               StageTimes& stage_times) {
+  if (remove_withdrawn(keyframe)) return;
   mapper.process(keyframe, should_stop);
   publish_poses();
   const LocalMapper::Times& t = mapper.times();
@@ -200,6 +239,7 @@ void Slam::Impl::submit(KeyframeId keyframe, const Frame& frame, const DynamicOb
     DenseInput input;
     input.frame = frame;
     input.dynamic_objects = objects;
+    if (const auto noise = front_end.noise().depth()) input.depth_noise = options.noise.at_least(*noise);
     input.is_restored = restoration && options.dense.restore && options.dense.remove;
     if (!front_end.labels().empty()) {
       const std::scoped_lock lock(map_mutex);

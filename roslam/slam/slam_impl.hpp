@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -24,6 +25,9 @@
 
 namespace roslam {
 
+inline constexpr const char* kGyroscopeContradicts =
+    "the images contradict the gyroscope, which is not used; check imu.T_camera_imu and its clock";
+
 /// The parts of the pipeline and how they are joined.
 struct Slam::Impl {
   Impl(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,
@@ -40,11 +44,14 @@ struct Slam::Impl {
   KeyframeId create_keyframe(TrackedFrame& tracked, std::size_t frame_index);
   std::vector<KeyframeId> similar_keyframes(const ObservedFrame& view) const;
   void cull_contradicted(const TrackedFrame& tracked, const Frame& frame, const DynamicObjects& objects);
+  void withdraw(const Withdrawal& wrong, FrameResult& result);
+  bool remove_withdrawn(KeyframeId keyframe);
   void map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   void close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   bool needs_poses() const { return dense || restoration; }
   void publish_poses();
   void submit(KeyframeId keyframe, const Frame& frame, const DynamicObjects& objects);
+  void check_gyroscope(FrameResult& result);
   void note_times(const FrontEndResult& observation, double total);
 
   Camera camera;
@@ -63,6 +70,7 @@ struct Slam::Impl {
   std::optional<LoopCloser> loop_closer;
   TrajectoryLog log;
   StageTimes times;
+  bool warned_of_gyroscope = false;
   std::map<std::string, std::string> backends;  // what runs each network
   // Last, so that their threads stop before the members they use are destroyed.
   std::optional<DenseWorker> dense;

@@ -30,12 +30,26 @@ void interpolate_between(Trajectory& trajectory, std::size_t from, std::size_t t
 void TrajectoryLog::add(const TrackedFrame& frame, std::size_t index, const Map& map) {
   ++by_state_[frame.state];
   Record record{index, frame.timestamp, {}, {}};
-  record.is_measured = frame.state == TrackingState::kTracking;
+  record.state = frame.state;
   if (frame.T_camera_world && frame.reference.is_valid()) {
     record.reference = frame.reference;
     record.T_camera_reference = *frame.T_camera_world * map.T_camera_world(frame.reference).inverse();
   }
   records_.push_back(record);
+}
+
+std::size_t TrajectoryLog::withdraw_after(double timestamp) {
+  std::size_t poses = 0;
+  for (std::size_t i = records_.size(); i-- > 1 && records_[i - 1].timestamp > timestamp;) {
+    Record& record = records_[i - 1];
+    if (!record.reference.is_valid()) continue;  // it has none
+    record.reference = {};
+    --by_state_[record.state];
+    ++by_state_[record.state = TrackingState::kRecentlyLost];
+    ++poses;
+  }
+  withdrawn_ += poses;
+  return poses;
 }
 
 void TrajectoryLog::add_evidence(const LandmarksInView& landmarks) {
@@ -53,7 +67,7 @@ std::set<SubmapId> TrajectoryLog::submaps_on_objects(const Map& map) const {
   };
   std::map<SubmapId, Evidence> evidence;
   for (const auto& record : records_) {
-    if (!record.reference.is_valid() || !record.is_measured) continue;
+    if (!record.reference.is_valid() || !record.is_measured()) continue;
     Evidence& of_submap = evidence[map.submap_of(record.reference)];
     ++of_submap.frames;
     of_submap.share += static_cast<double>(record.share_on_objects);
@@ -77,7 +91,7 @@ Trajectory TrajectoryLog::trajectory(const Map& map, SubmapId submap) const {
     }
     const SE3 T_camera_world = record.T_camera_reference * map.T_camera_world(record.reference);
     result.push_back({record.timestamp, T_camera_world.inverse()});
-    if (!record.is_measured) continue;
+    if (!record.is_measured()) continue;
     if (measured != kNone) interpolate_between(result, measured, result.size() - 1);
     measured = result.size() - 1;
   }

@@ -22,6 +22,10 @@ class TrajectoryLog {
  public:
   /// index: of the frame in its source.
   void add(const TrackedFrame& frame, std::size_t index, const Map& map);
+  /// Withdraws the poses of frames later than that (seconds) before the one last added. Returns how many.
+  std::size_t withdraw_after(double timestamp);
+  std::size_t withdrawn() const { return withdrawn_; }  ///< so far
+
   /// Of the frame last added: landmarks that were in view, and those of them that are on dynamic objects.
   void add_evidence(const LandmarksInView& landmarks);
 
@@ -61,13 +65,16 @@ class TrajectoryLog {
     KeyframeId reference;  // invalid: not tracked
     SE3 T_camera_reference;
     float share_on_objects = 0.0F;  // of the landmarks in view
-    bool is_measured = false;       // not predicted
+    TrackingState state = TrackingState::kLost;
+
+    bool is_measured() const { return state == TrackingState::kTracking; }
   };
 
   std::vector<Record> records_;
   std::map<TrackingState, std::size_t> by_state_;
   std::map<RejectReason, std::size_t> rejected_;
   std::size_t clock_resets_ = 0;
+  std::size_t withdrawn_ = 0;
 };
 
 }  // namespace roslam

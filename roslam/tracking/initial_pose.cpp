@@ -9,6 +9,7 @@ namespace roslam {
 
 namespace {
 constexpr LandmarkId kTemporary{LandmarkId::kNone - 1};  // marks points of the frame with a temporary point
+constexpr LandmarkId kTaken{LandmarkId::kNone - 2};      // that are not to be matched
 }  // namespace
 
 // Drops the matches whose feature turned otherwise than most.
@@ -40,10 +41,14 @@ std::optional<PoseCandidate> InitialPoseEstimator::from_last_frame(const Observe
                                                                    const TrackedFrame& last,
                                                                    const SE3& T_world_last,
                                                                    const SE3& predicted_T_camera_world,
-                                                                   float radius_factor) {
+                                                                   const Search& search) {
   PoseCandidate candidate;
   candidate.T_camera_world = predicted_T_camera_world;
   candidate.landmarks.resize(view.size());
+  const RestingPoints resting{{}, 0.0, search.rested};
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    if (view.may_move(i) && !resting.has_rested(i)) candidate.landmarks[i] = kTaken;
+  }
   Matches matches;
   for (std::size_t i = 0; i < last.view->size(); ++i) {
     const auto position = position_of(last, i, T_world_last);
@@ -54,7 +59,7 @@ std::optional<PoseCandidate> InitialPoseEstimator::from_last_frame(const Observe
     if (!view.grid.contains(pixel)) continue;
     const int level = last.view->levels[i];
     const float radius =
-        radius_factor * static_cast<float>(settings_.matcher.frame_radius) * map_.scale(level);
+        search.radius_factor * static_cast<float>(settings_.matcher.frame_radius) * map_.scale(level);
     const int match = matcher_.find({pixel, radius, level - 1, level + 1, static_cast<float>(in_camera.z()),
                                      settings_.matcher.max_distance, false},
                                     last.view->descriptors[i], view, candidate.landmarks);
@@ -65,6 +70,9 @@ std::optional<PoseCandidate> InitialPoseEstimator::from_last_frame(const Observe
     matches.positions.push_back(*position);
     matches.points.push_back(point);
     matches.rotations.push_back(last.view->angles[i] - view.angles[point]);
+  }
+  for (LandmarkId& landmark : candidate.landmarks) {
+    if (landmark == kTaken) landmark = {};
   }
   matches.keep_consistent_rotation(candidate.landmarks);
   return estimate(view, matches, std::move(candidate));
@@ -128,15 +136,20 @@ OptimisedPose optimise_frame(const Camera& camera, const Map& map, const Observe
                              const std::vector<std::uint32_t>& points,
                              const std::vector<Eigen::Vector3d>& positions, const SE3& initial_T_camera_world,
                              const MeasurementNoise& noise, const PoseOptimiserOptions& options,
-                             std::vector<LandmarkId>& landmarks) {
+                             std::vector<LandmarkId>& landmarks, const RestingPoints& resting) {
   std::vector<PoseMeasurement> measurements(points.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
     measurements[k].point_world = positions[k];
     measurements[k].measurement = map.measurement(view, points[k], noise);
+    if (view.may_move(points[k]) && !resting.has_rested(points[k])) measurements[k].weight = resting.weight;
   }
+  for (const auto& [point, position] : resting.points)
+    measurements.push_back({position, map.measurement(view, point, noise), resting.weight});
   OptimisedPose pose = optimise_pose(camera, measurements, initial_T_camera_world, options);
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    if (!pose.is_inlier[k]) landmarks[points[k]] = {};
+  for (std::size_t k = 0; k < measurements.size(); ++k) {
+    const bool is_static = k < points.size() && (!view.may_move(points[k]) || resting.has_rested(points[k]));
+    if (!is_static && pose.is_inlier[k]) --pose.inliers;
+    if (k < points.size() && !pose.is_inlier[k]) landmarks[points[k]] = {};
   }
   return pose;
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "roslam/estimation/pose_optimiser.hpp"
@@ -44,11 +45,16 @@ class InitialPoseEstimator {
   InitialPoseEstimator(const Camera& camera, const Map& map, const Settings& settings)
       : camera_(camera), map_(map), settings_(settings), matcher_(settings.matcher) {}
 
-  /// From the points of the last frame, whose pose is T_world_last, searched for within radius_factor times
-  /// matcher.frame_radius of where the prediction puts them. Nothing if too few of the matches agree.
+  struct Search {
+    float radius_factor = 1.0F;                 ///< of matcher.frame_radius
+    std::span<const std::uint8_t> rested = {};  ///< as RestingPoints; other movable points are not matched
+  };
+
+  /// From the points of the last frame, whose pose is T_world_last, searched for around where the prediction
+  /// puts them. Nothing if too few of the matches agree.
   std::optional<PoseCandidate> from_last_frame(const ObservedFrame& view, const TrackedFrame& last,
                                                const SE3& T_world_last, const SE3& predicted_T_camera_world,
-                                               float radius_factor);
+                                               const Search& search);
 
   /// From a keyframe, by descriptors alone. initial_T_camera_world: where the optimisation starts.
   std::optional<PoseCandidate> from_keyframe(const ObservedFrame& view, const Keyframe& keyframe,
@@ -79,12 +85,24 @@ class InitialPoseEstimator {
   ProjectionMatcher matcher_;
 };
 
+/// Points on movable objects at rest.
+struct RestingPoints {
+  std::vector<TemporaryPoint> points;  ///< without a landmark
+  double weight = 1.0;                 ///< of movable points that have not rested, as PoseMeasurement
+
+  /// For each point of the frame: not 0 on an object that rested for long, which counts like static points.
+  /// Empty: none. Movable points that have not are no inliers.
+  std::span<const std::uint8_t> rested = {};
+
+  bool has_rested(std::size_t point) const { return point < rested.size() && rested[point] != 0; }
+};
+
 /// Optimises the pose of a frame on matches of its points with positions in the world. Unsets the landmarks
 /// of outliers.
 OptimisedPose optimise_frame(const Camera& camera, const Map& map, const ObservedFrame& view,
                              const std::vector<std::uint32_t>& points,
                              const std::vector<Eigen::Vector3d>& positions, const SE3& initial_T_camera_world,
                              const MeasurementNoise& noise, const PoseOptimiserOptions& options,
-                             std::vector<LandmarkId>& landmarks);
+                             std::vector<LandmarkId>& landmarks, const RestingPoints& resting = {});
 
 }  // namespace roslam

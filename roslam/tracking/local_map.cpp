@@ -26,7 +26,7 @@ void LocalMap::collect_keyframes(const Map& map, const std::vector<LandmarkId>& 
   }
   keyframes_.clear();
   for (std::uint32_t i = 0; i < votes.size(); ++i) {
-    if (votes[i] > 0) keyframes_.push_back(KeyframeId{i});
+    if (votes[i] > 0 && !map.is_withdrawn(KeyframeId{i})) keyframes_.push_back(KeyframeId{i});
   }
   std::stable_sort(keyframes_.begin(), keyframes_.end(),
                    [&](KeyframeId a, KeyframeId b) { return votes[a.index()] > votes[b.index()]; });
@@ -42,7 +42,7 @@ void LocalMap::collect_keyframes(const Map& map, const std::vector<LandmarkId>& 
     int added = 0;
     for (const auto& [id, shared] : map.covisible(reference_)) {
       if (keyframes_.size() >= limit || added >= options_.neighbours) break;
-      if (is_in[id.index()]) continue;
+      if (is_in[id.index()] || map.is_withdrawn(id)) continue;
       is_in[id.index()] = true;
       keyframes_.push_back(id);
       ++added;

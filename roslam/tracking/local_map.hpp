@@ -17,6 +17,9 @@ class LocalMap {
   /// seen: landmark of each point of the frame, or none. If there is none at all, fallback is the reference.
   void update(const Map& map, const std::vector<LandmarkId>& seen, KeyframeId fallback);
 
+  /// Those that share most landmarks with the frame first.
+  const std::vector<KeyframeId>& keyframes() const { return keyframes_; }
+
   const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
 
   /// The keyframe that shares most landmarks with the frame.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/tracking/pose_check.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -15,6 +16,12 @@ void PlausibilityOptions::validate() const {
   if (!(poor_found_share >= 0.0 && poor_found_share <= 1.0))
     throw OptionsError("plausible.poor_found_share must be 0 to 1");
   if (!(max_pixel_error > 0.0)) throw OptionsError("plausible.max_pixel_error must be positive (sigmas)");
+  if (!(max_position_sigma > 0.0))
+    throw OptionsError("plausible.max_position_sigma must be positive (metres)");
+  if (!(max_rotation_sigma > 0.0))
+    throw OptionsError("plausible.max_rotation_sigma must be positive (degrees)");
+  if (!(constrained_sigma > 0.0 && constrained_sigma <= max_position_sigma))
+    throw OptionsError("plausible.constrained_sigma must be above 0 and at most max_position_sigma (metres)");
   if (!(max_speed > 0.0)) throw OptionsError("plausible.max_speed must be positive (m/s)");
   if (!(max_acceleration > 0.0)) throw OptionsError("plausible.max_acceleration must be positive (m/s^2)");
   if (!(max_turn_rate > 0.0)) throw OptionsError("plausible.max_turn_rate must be positive (degrees/s)");
@@ -28,6 +35,8 @@ std::string_view describe(PoseDoubt doubt) {
       return "too few landmarks agree";
     case PoseDoubt::kFewFound:
       return "too few of the landmarks in view are found";
+    case PoseDoubt::kUncertain:
+      return "the landmarks hardly constrain it";
     case PoseDoubt::kPoorFit:
       return "few of the landmarks in view are found, and not well";
     case PoseDoubt::kSpeed:
@@ -36,8 +45,32 @@ std::string_view describe(PoseDoubt doubt) {
       return "the acceleration is not plausible";
     case PoseDoubt::kTurnRate:
       return "the turn rate is not plausible";
+    case PoseDoubt::kGyroscope:
+      return "the gyroscope contradicts";
   }
   return "unknown";
+}
+
+PoseDoubt check_certainty(const Matrix6d& covariance, const PlausibilityOptions& options) {
+  const auto largest_sigma = [](const Eigen::Matrix3d& block) {
+    return std::sqrt(std::max(0.0, block.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
+  };
+  const double position = largest_sigma(covariance.topLeftCorner<3, 3>());
+  const double rotation = largest_sigma(covariance.bottomRightCorner<3, 3>()) * 180.0 / std::numbers::pi;
+  const bool is_certain = position <= options.max_position_sigma && rotation <= options.max_rotation_sigma;
+  return is_certain ? PoseDoubt::kNone : PoseDoubt::kUncertain;
+}
+
+std::vector<Eigen::Vector3d> unconstrained_directions(const Matrix6d& covariance,
+                                                      const PlausibilityOptions& options) {
+  const Eigen::Matrix3d position = covariance.topLeftCorner<3, 3>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solved(position);
+  std::vector<Eigen::Vector3d> result;
+  for (int i = 2; i >= 0; --i) {
+    if (solved.eigenvalues()[i] > options.constrained_sigma * options.constrained_sigma)
+      result.push_back(solved.eigenvectors().col(i));
+  }
+  return result;
 }
 
 PoseDoubt check_motion(const MotionState& last, double timestamp, const SE3& T_world_camera, double sigma,

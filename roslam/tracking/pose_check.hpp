@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "roslam/geometry/se3.hpp"
 #include "roslam/tracking/tracking_options.hpp"
@@ -15,14 +16,24 @@ enum class PoseDoubt {
   kNone,          ///< it is
   kFewInliers,    ///< too few landmarks agree
   kFewFound,      ///< too few of the landmarks that the pose puts into view are found
+  kUncertain,     ///< position or rotation is hardly constrained along some direction
   kPoorFit,       ///< few of them are found, and the matches are off by much, as in a blurred image
   kSpeed,         ///< the camera would have moved faster than plausible.max_speed
   kAcceleration,  ///< its velocity would have changed faster than plausible.max_acceleration
-  kTurnRate       ///< it would have turned faster than plausible.max_turn_rate
+  kTurnRate,      ///< it would have turned faster than plausible.max_turn_rate
+  kGyroscope      ///< it would have turned otherwise than the gyroscope shows
 };
 
 /// In words, for reports.
 std::string_view describe(PoseDoubt doubt);
+
+/// Whether the inliers constrain a pose, by its covariance as OptimisedPose gives it.
+PoseDoubt check_certainty(const Matrix6d& covariance, const PlausibilityOptions& options);
+
+/// The directions (unit length, camera frame) along which they constrain the position to no better than
+/// plausible.constrained_sigma; at most three, orthogonal.
+std::vector<Eigen::Vector3d> unconstrained_directions(const Matrix6d& covariance,
+                                                      const PlausibilityOptions& options);
 
 /// The last pose that was accepted, and the velocity with which the camera came there.
 struct MotionState {

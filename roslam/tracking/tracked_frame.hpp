@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -11,6 +12,13 @@
 #include "roslam/tracking/tracking_state.hpp"
 
 namespace roslam {
+
+/// Poses that turned out to be wrong.
+struct Withdrawal {
+  double after = 0.0;                 ///< seconds: of frames since, without the one that contradicts them
+  std::vector<KeyframeId> keyframes;  ///< made from them
+  KeyframeId confirmed;               ///< reference of the last frame whose pose stays
+};
 
 /// The tracking result of a frame.
 struct TrackedFrame {
@@ -24,9 +32,10 @@ struct TrackedFrame {
   int visible = 0;                                     ///< landmarks that the pose puts into view unoccluded
   Matrix6d measurement_covariance = Matrix6d::Zero();  ///< of the pose in the local map, as OptimisedPose
   Matrix6d covariance = Matrix6d::Zero();  ///< of the pose in its submap, likewise; see PoseCovariance
-  double quality = 0.0;  ///< 0 (predicted or unknown) to 1 (trusted_inliers or more inliers)
-  int hidden = 0;        ///< landmarks of the reference that removed objects hide
-  KeyframeId reference;  ///< shares most landmarks; none for the first frame of a submap
+  double quality = 0.0;                  ///< 0 (predicted or unknown) to 1 (trusted_inliers or more inliers)
+  int hidden = 0;                        ///< landmarks of the reference that removed objects hide
+  std::optional<Withdrawal> withdrawal;  ///< if this frame contradicts earlier ones
+  KeyframeId reference;                  ///< shares most landmarks; none for the first frame of a submap
 };
 
 }  // namespace roslam

@@ -1,23 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/tracking/tracker.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/stopwatch.hpp"
+#include "roslam/tracking/resting_points.hpp"
 
 namespace roslam {
 
 namespace {
-// Standard deviation of the position along its least certain direction, metres.
-double position_sigma(const Matrix6d& covariance) {
-  const Eigen::Matrix3d position = covariance.topLeftCorner<3, 3>();
-  return std::sqrt(std::max(0.0, position.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
-}
-
 // The first camera defines the world frame, assumed level: x forward, y left, z up (REP 103).
 SE3 first_T_camera_world() {
   Eigen::Matrix3d R;
@@ -28,40 +23,6 @@ SE3 first_T_camera_world() {
 }
 }  // namespace
 
-std::string_view name_of(TrackingState state) {
-  switch (state) {
-    case TrackingState::kInitialising:
-      return "initialising";
-    case TrackingState::kTracking:
-      return "tracking";
-    case TrackingState::kPredicted:
-      return "predicted";
-    case TrackingState::kRecentlyLost:
-      return "recently lost";
-    case TrackingState::kLost:
-      return "lost";
-  }
-  return "unknown";
-}
-
-void TrackerOptions::validate() const {
-  if (min_initial_points < 10) throw OptionsError("tracker.min_initial_points must be at least 10");
-  if (min_inliers < 6) throw OptionsError("tracker.min_inliers must be at least 6");
-  if (min_frame_matches < 6) throw OptionsError("tracker.min_frame_matches must be at least 6");
-  if (!(min_agreement >= 0.0 && min_agreement <= 1.0))
-    throw OptionsError("tracker.min_agreement must be 0 to 1");
-  if (trusted_inliers < 1) throw OptionsError("tracker.trusted_inliers must be at least 1");
-  if (scarce_inliers < 0) throw OptionsError("tracker.scarce_inliers must not be negative");
-  if (!(hidden_share >= 0.0 && hidden_share <= 1.0))
-    throw OptionsError("tracker.hidden_share must be 0 to 1");
-  if (!(max_predicted >= 0.0 && max_predicted <= 60.0))
-    throw OptionsError("tracker.max_predicted must be 0 to 60 seconds");
-  if (!(max_wait_to_start >= 0.0 && max_wait_to_start <= 60.0))
-    throw OptionsError("tracker.max_wait_to_start must be 0 to 60 seconds");
-  if (new_submap_after_lost < 0) throw OptionsError("tracker.new_submap_after_lost must not be negative");
-  if (recently_lost_frames < 0) throw OptionsError("tracker.recently_lost_frames must not be negative");
-}
-
 Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
     : camera_(camera),
       map_(map),
@@ -71,7 +32,8 @@ Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
       local_map_(settings.local_map),
       relocaliser_(settings.relocaliser,
                    GeometricVerifier(camera, {settings.geometric_verifier, settings.matcher, settings.pose,
-                                              settings.noise})) {
+                                              settings.noise})),
+      motion_(camera, map, settings.plausible, settings.tracker.use_gyroscope) {
   settings.tracker.validate();
   settings.plausible.validate();
   settings.matcher.validate();
@@ -92,6 +54,8 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     return can_start(frame, hint) ? initialise(std::move(frame)) : frame;
   }
 
+  is_contradiction_ = false;
+  rested_ = hint.rested;
   const bool was_known = state_ == TrackingState::kTracking || state_ == TrackingState::kPredicted;
   const bool found = (was_known && follow(frame, hint)) || relocalise(frame, hint);
   if (found) {
@@ -103,6 +67,7 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     count_found(frame);
     frame.covariance =
         covariance_.of_frame(map_, *frame.T_camera_world, frame.landmarks, frame.measurement_covariance);
+    reconsider(frame);
     remember(frame);
   } else if (was_known && predict_hidden(frame, hint)) {
     state_ = TrackingState::kPredicted;
@@ -113,7 +78,7 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     ++frames_lost_;
     state_ = frames_lost_ <= settings_.tracker.recently_lost_frames ? TrackingState::kRecentlyLost
                                                                     : TrackingState::kLost;
-    velocity_.reset();
+    last_.velocity.reset();
     drop_pose(frame);
   }
   frame.state = state_;
@@ -133,9 +98,7 @@ void Tracker::drop_pose(TrackedFrame& frame) {
 // centimetres. Where that lasts, it is the map that is poor.
 void Tracker::withhold_poor_fit(TrackedFrame& frame) {
   constexpr double kLongest = 0.3;  // seconds
-  const bool is_poor = frame.pixel_error_scale > settings_.plausible.max_pixel_error &&
-                       frame.inliers < settings_.plausible.poor_found_share * frame.visible;
-  if (!is_poor) {
+  if (!is_poor_fit(frame)) {
     last_fit_ = frame.timestamp;
   } else if (last_fit_ && frame.timestamp - *last_fit_ <= kLongest) {
     ++doubts_[PoseDoubt::kPoorFit];
@@ -168,22 +131,23 @@ TrackedFrame Tracker::initialise(TrackedFrame frame) {
   frame.state = state_ = TrackingState::kTracking;
   frames_lost_ = frames_unrecognised_ = 0;
   relocaliser_.restart();
-  velocity_.reset();
+  last_.velocity.reset();
   waits_since_.reset();
-  last_ = frame;
+  last_ = {frame, {}, {}};
+  tentative_.restart();
   return frame;
 }
 
 std::optional<SE3> Tracker::predicted_pose(double timestamp) const {
   const bool is_known = state_ == TrackingState::kTracking || state_ == TrackingState::kPredicted;
   if (!is_known || map_.keyframe_count() == 0) return std::nullopt;
-  return predict_pose(timestamp);
+  return motion_.predict(last_, timestamp);
 }
 
 // The candidates by predictions are tried first. Where they are refused, or few inliers support the best, the
 // reference keyframe, by descriptors, and the last frame, in a wide search, give others.
 bool Tracker::follow(TrackedFrame& frame, const FrameHint& hint) {
-  if (!last_.reference.is_valid()) return false;
+  if (!last_.frame.reference.is_valid()) return false;
   const Stopwatch watch;
   const SE3 T_world_last = last_pose()->inverse();
   const std::vector<SE3> predicted = predictions(frame.timestamp, hint.T_camera_world);
@@ -193,17 +157,24 @@ bool Tracker::follow(TrackedFrame& frame, const FrameHint& hint) {
   };
   bool is_trusted = false;
   for (const SE3& pose : predicted) {
-    add(initial_pose_.from_last_frame(*frame.view, last_, T_world_last, pose, 1.0F));
+    add(initial_pose_.from_last_frame(*frame.view, last_.frame, T_world_last, pose, {1.0F, rested_}));
     is_trusted |= !candidates.empty() && candidates.back().inliers >= settings_.tracker.trusted_inliers;
   }
   times_.match_frame += watch.seconds();
   if (is_trusted && accept_best(frame, std::exchange(candidates, {}), hint)) return true;
   const Stopwatch second_watch;
-  if (const Keyframe* reference = map_.find(last_.reference))
+  if (const Keyframe* reference = map_.find(last_.frame.reference))
     add(initial_pose_.from_keyframe(*frame.view, *reference, T_world_last.inverse()));
   constexpr float kWider = 3.0F;
-  add(initial_pose_.from_last_frame(*frame.view, last_, T_world_last,
-                                    predicted.empty() ? T_world_last.inverse() : predicted.front(), kWider));
+  add(initial_pose_.from_last_frame(*frame.view, last_.frame, T_world_last,
+                                    predicted.empty() ? T_world_last.inverse() : predicted.front(),
+                                    {kWider, rested_}));
+  // Tentative poses may be the fault: from the last one before them.
+  if (const TrackedState* confirmed = confirmed_here(last_.frame.reference, frame.timestamp)) {
+    const SE3 T_camera_world = *confirmed->T_camera_world(map_);
+    add(initial_pose_.from_last_frame(*frame.view, confirmed->frame, T_camera_world.inverse(), T_camera_world,
+                                      {kWider, rested_}));
+  }
   times_.match_frame += second_watch.seconds();
   return accept_best(frame, std::move(candidates), hint);
 }
@@ -212,7 +183,7 @@ bool Tracker::follow(TrackedFrame& frame, const FrameHint& hint) {
 bool Tracker::accept_best(TrackedFrame& frame, std::vector<PoseCandidate> candidates, const FrameHint& hint) {
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const auto& a, const auto& b) { return a.inliers > b.inliers; });
-  const KeyframeId near = map_.T_camera_anchor(last_.reference).first;
+  const KeyframeId near = map_.T_camera_anchor(last_.frame.reference).first;
   for (PoseCandidate& candidate : candidates) {
     refine_with_local_map(frame, std::move(candidate), near, hint.depth);
     if (is_accepted(frame, settings_.tracker.min_inliers)) return true;
@@ -223,50 +194,50 @@ bool Tracker::accept_best(TrackedFrame& frame, std::vector<PoseCandidate> candid
 PoseDoubt Tracker::doubt_of(const TrackedFrame& frame, int min_inliers) const {
   if (frame.inliers < min_inliers) return PoseDoubt::kFewInliers;
   if (frame.inliers < settings_.plausible.min_found_share * frame.visible) return PoseDoubt::kFewFound;
-  const bool is_same_submap =
-      last_.reference.is_valid() && map_.submap_of(last_.reference) == map_.submap_of(frame.reference);
-  if (!is_same_submap) return PoseDoubt::kNone;
-  MotionState last{last_.timestamp, last_pose()->inverse(), position_sigma(last_.measurement_covariance), {}};
-  if (velocity_) last.velocity = -(last.T_world_camera.rotation() * velocity_->head<3>());
-  return check_motion(last, frame.timestamp, frame.T_camera_world->inverse(),
-                      position_sigma(frame.measurement_covariance), settings_.plausible);
+  const PoseDoubt uncertain = check_certainty(frame.measurement_covariance, settings_.plausible);
+  return uncertain != PoseDoubt::kNone ? uncertain : motion_.doubt(last_, frame);
 }
 
+// A pose is not refused because it does not fit tentative ones, if it is strong and fits those before.
 bool Tracker::is_accepted(const TrackedFrame& frame, int min_inliers) {
   const PoseDoubt doubt = doubt_of(frame, min_inliers);
+  const bool is_by_motion = doubt == PoseDoubt::kSpeed || doubt == PoseDoubt::kAcceleration ||
+                            doubt == PoseDoubt::kTurnRate || doubt == PoseDoubt::kGyroscope;
+  const TrackedState* confirmed =
+      is_by_motion && is_strong(frame) ? confirmed_here(frame.reference, frame.timestamp) : nullptr;
+  is_contradiction_ = confirmed != nullptr && motion_.doubt(*confirmed, frame) == PoseDoubt::kNone;
+  if (is_contradiction_) return true;
   if (doubt != PoseDoubt::kNone) ++doubts_[doubt];
+  if (doubt == PoseDoubt::kGyroscope && is_strong(frame)) motion_.note_refusal();
   return doubt == PoseDoubt::kNone;
 }
 
-// By optical flow and by the motion model, unless they agree. Either may be wrong: flow on repeated
-// structure, the motion model where the motion changes.
+// The last pose before tentative ones, if there are such and it is in the submap of a keyframe.
+const TrackedState* Tracker::confirmed_here(KeyframeId keyframe, double timestamp) const {
+  const TrackedState* confirmed = tentative_.confirmed(timestamp);
+  if (confirmed == nullptr || !keyframe.is_valid() || !confirmed->frame.reference.is_valid()) return nullptr;
+  return map_.submap_of(confirmed->frame.reference) == map_.submap_of(keyframe) ? confirmed : nullptr;
+}
+
+// By optical flow, by the gyroscope and by the motion model, those that differ. Each may be wrong: flow on
+// repeated structure, the gyroscope by its mounting, the motion model where the motion changes.
 std::vector<SE3> Tracker::predictions(double timestamp, const std::optional<SE3>& by_flow) const {
   std::vector<SE3> result;
   if (by_flow) result.push_back(*by_flow);
-  if (!velocity_) return result;
-  const SE3 by_motion = predict_pose(timestamp);
-  const bool agrees = by_flow && initial_pose_.disagreement(last_, last_pose()->inverse(), *by_flow,
-                                                            by_motion) < settings_.matcher.frame_radius;
-  if (!agrees) result.push_back(by_motion);
+  const SE3 T_world_last = last_pose()->inverse();
+  const auto add = [&](const SE3& predicted) {
+    const bool is_new = std::none_of(result.begin(), result.end(), [&](const SE3& other) {
+      return initial_pose_.disagreement(last_.frame, T_world_last, other, predicted) <
+             settings_.matcher.frame_radius;
+    });
+    if (is_new) result.push_back(predicted);
+  };
+  if (const auto turned = motion_.by_gyroscope(last_, timestamp)) add(*turned);
+  if (last_.velocity) add(motion_.by_velocity(last_, timestamp));
   return result;
 }
 
-std::optional<SE3> Tracker::last_pose() const {
-  if (!last_.reference.is_valid()) return last_.T_camera_world;
-  return T_last_reference_ * map_.T_camera_world(last_.reference);
-}
-
-SE3 Tracker::predict_pose(double timestamp) const {
-  const SE3 last = *last_pose();
-  if (!velocity_) return last;
-  // Constant velocity at first, then it decays exponentially: over many frames the model does not hold.
-  constexpr double kSteady = 0.1;  // seconds of constant velocity
-  constexpr double kDecay = 0.4;   // seconds, time constant
-  const double elapsed = timestamp - last_.timestamp;
-  const double beyond = std::max(elapsed - kSteady, 0.0);
-  const double duration = std::min(elapsed, kSteady) + kDecay * (1.0 - std::exp(-beyond / kDecay));
-  return SE3::exp(*velocity_ * duration) * last;
-}
+std::optional<SE3> Tracker::last_pose() const { return last_.T_camera_world(map_); }
 
 // Whether a surface in the image is nearer than the landmark, so that it cannot be seen.
 bool Tracker::is_occluded(const Prediction& predicted, const cv::Mat& depth) const {
@@ -305,6 +276,24 @@ void Tracker::match_local_landmarks(TrackedFrame& frame, const cv::Mat& depth) {
   }
 }
 
+// Of the keyframes that share most landmarks with the frame. used: points of the frame.
+RestingPoints Tracker::resting_points(const TrackedFrame& frame, const std::vector<std::uint32_t>& used) {
+  constexpr std::size_t kKeyframes = 3;
+  const ObservedFrame& view = *frame.view;
+  if (settings_.resting_weight <= 0.0 || view.is_movable.empty()) return {{}, 0.0, rested_};
+  std::vector<KeyframeId> keyframes = local_map_.keyframes();
+  keyframes.resize(std::min(keyframes.size(), kKeyframes));
+  std::vector<LandmarkId> taken = frame.landmarks;
+  for (const std::uint32_t point : used) taken[point] = LandmarkId{LandmarkId::kNone - 1};
+  RestingPoints resting{
+      match_resting_points(map_, camera_, keyframes, view, *frame.T_camera_world, std::move(taken), matcher_),
+      settings_.resting_weight, rested_};
+  // All of them together count no more than what is static.
+  const auto all = static_cast<double>(std::max<std::size_t>(1, resting.points.size()));
+  resting.weight = std::min(resting.weight, static_cast<double>(used.size()) / all);
+  return resting;
+}
+
 void Tracker::refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate, KeyframeId near,
                                     const cv::Mat& depth) {
   Stopwatch watch;
@@ -329,9 +318,10 @@ void Tracker::refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate
       points.push_back(temporary.point);
     }
   }
+  const RestingPoints resting = resting_points(frame, points);
   const OptimisedPose pose =
       optimise_frame(camera_, map_, *frame.view, points, positions, *frame.T_camera_world, settings_.noise,
-                     settings_.pose, frame.landmarks);
+                     settings_.pose, frame.landmarks, resting);
   frame.T_camera_world = pose.T_camera_world;
   frame.measurement_covariance = pose.covariance;
   frame.pixel_error_scale = pose.pixel_error_scale;
@@ -342,11 +332,12 @@ void Tracker::refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate
 // While dynamic objects hide the scene, the pose is extrapolated with the motion model for a limited time.
 bool Tracker::predict_hidden(TrackedFrame& frame, const FrameHint& hint) {
   const bool is_hidden = hint.hidden_share >= settings_.tracker.hidden_share;
-  if (!is_hidden || frame.timestamp - last_.timestamp > settings_.tracker.max_predicted) return false;
-  frame.T_camera_world = predict_pose(frame.timestamp);
-  frame.covariance = PoseCovariance::of_prediction(
-      last_.covariance, *frame.T_camera_world * last_pose()->inverse(), frame.timestamp - last_.timestamp);
-  frame.reference = last_.reference;
+  if (!is_hidden || frame.timestamp - last_.frame.timestamp > settings_.tracker.max_predicted) return false;
+  frame.T_camera_world = motion_.predict(last_, frame.timestamp);
+  frame.covariance =
+      PoseCovariance::of_prediction(last_.frame.covariance, *frame.T_camera_world * last_pose()->inverse(),
+                                    frame.timestamp - last_.frame.timestamp);
+  frame.reference = last_.frame.reference;
   frame.inliers = 0;
   frame.landmarks.assign(frame.view->size(), {});
   return true;
@@ -356,7 +347,8 @@ bool Tracker::relocalise(TrackedFrame& frame, const FrameHint& hint) {
   const Stopwatch watch;
   const auto similar = hint.similar_keyframes ? hint.similar_keyframes() : std::vector<KeyframeId>{};
   // No prior on the pose: lost for long, or no frame tracked yet in a loaded map.
-  const bool search_all = last_.view == nullptr || frames_lost_ >= settings_.tracker.recently_lost_frames;
+  const bool search_all =
+      last_.frame.view == nullptr || frames_lost_ >= settings_.tracker.recently_lost_frames;
   const auto found = relocaliser_.find(map_, *frame.view, similar, search_all);
   times_.relocalise += watch.seconds();
   if (!found) return false;
@@ -375,33 +367,86 @@ void Tracker::count_found(const TrackedFrame& frame) {
   }
 }
 
+bool Tracker::is_poor_fit(const TrackedFrame& frame) const {
+  return frame.pixel_error_scale > settings_.plausible.max_pixel_error &&
+         frame.inliers < settings_.plausible.poor_found_share * frame.visible;
+}
+
+// Landmarks that tentative poses brought into the map do not confirm them.
+bool Tracker::is_strong(const TrackedFrame& frame) const {
+  const auto of_tentative = std::count_if(frame.landmarks.begin(), frame.landmarks.end(), [&](LandmarkId id) {
+    const Landmark* landmark = id.is_valid() ? map_.find(id) : nullptr;
+    return landmark != nullptr && tentative_.made(landmark->created_by);
+  });
+  return frame.inliers - of_tentative >= settings_.tracker.trusted_inliers && !is_poor_fit(frame);
+}
+
+// Tentative poses are withdrawn once a strong one contradicts them: it does not fit their motion, or the
+// image of the last of them, matched with this one, fits another pose better.
+void Tracker::reconsider(TrackedFrame& frame) {
+  if (confirmed_here(frame.reference, frame.timestamp) == nullptr || !is_strong(frame)) return;
+  if (!is_contradiction_ && !contradicts_last(frame)) return;
+  last_ = *tentative_.confirmed(frame.timestamp);
+  frame.withdrawal = tentative_.withdraw();
+  motion_.forget_rotation();
+  const auto& wrong = frame.withdrawal->keyframes;
+  if (std::find(wrong.begin(), wrong.end(), frame.reference) != wrong.end())
+    frame.reference = frame.withdrawal->confirmed;
+}
+
+// The last pose is searched for between those of this frame and of the last one that is not tentative.
+bool Tracker::contradicts_last(const TrackedFrame& frame) {
+  const TrackedState& confirmed = *tentative_.confirmed(frame.timestamp);
+  if (confirmed_here(last_.frame.reference, frame.timestamp) == nullptr) return false;
+  const double begin = confirmed.frame.timestamp;
+  const double share = (last_.frame.timestamp - begin) / (frame.timestamp - begin);
+  const SE3 before = *confirmed.T_camera_world(map_);
+  const SE3 between = SE3::exp(share * (*frame.T_camera_world * before.inverse()).log()) * before;
+  const auto matched_around = [&](const SE3& predicted, float radius_factor) {
+    return initial_pose_.from_last_frame(*last_.frame.view, frame, frame.T_camera_world->inverse(), predicted,
+                                         {radius_factor, rested_});
+  };
+  const auto other = matched_around(between, 3.0F);
+  if (!other) return false;
+  // A wrong step of evaluations, beyond three sigmas.
+  constexpr double kFar = 0.08;                               // metres
+  constexpr double kTurned = 4.0 * std::numbers::pi / 180.0;  // radians
+  const SE3 last = *last_pose();
+  const SE3 off = other->T_camera_world * last.inverse();
+  const double sigma = std::sqrt(last_.frame.measurement_covariance.topLeftCorner<3, 3>().trace());
+  if (off.translation().norm() < kFar + 3.0 * sigma && off.angle() < kTurned) return false;
+  // Repeated structure may fit two poses equally.
+  constexpr double kBetter = 1.2;  // times as many inliers
+  const auto same = matched_around(last, 1.0F);
+  return !same || other->inliers > kBetter * same->inliers;
+}
+
 void Tracker::remember(const TrackedFrame& frame) {
-  const double elapsed = frame.timestamp - last_.timestamp;
-  constexpr double kMaxGap = 0.5;  // seconds; after a longer gap the velocity is of no use
-  const bool is_same_submap =
-      last_.reference.is_valid() && map_.submap_of(last_.reference) == map_.submap_of(frame.reference);
-  if (is_same_submap && elapsed > 0.0 && elapsed < kMaxGap) {
-    velocity_ = (*frame.T_camera_world * last_pose()->inverse()).log() / elapsed;
-  } else {
-    velocity_.reset();
-  }
-  last_ = frame;
-  T_last_reference_ = *frame.T_camera_world * map_.T_camera_world(frame.reference).inverse();
+  const auto velocity = motion_.velocity(last_, frame);
+  last_ = {frame, *frame.T_camera_world * map_.T_camera_world(frame.reference).inverse(), velocity};
+  motion_.learn(last_);
+  const TrackedState* confirmed = tentative_.confirmed(frame.timestamp);
+  if (confirmed != nullptr && confirmed_here(frame.reference, frame.timestamp) == nullptr)
+    tentative_.restart();
+  tentative_.add(last_, is_strong(frame));
 }
 
 void Tracker::keyframe_created(KeyframeId id) {
   const Keyframe& keyframe = *map_.find(id);
-  covariance_.add_keyframe(id, last_.covariance);
-  last_.reference = id;
-  last_.landmarks = keyframe.landmarks;
-  T_last_reference_ = SE3();
+  covariance_.add_keyframe(id, last_.frame.covariance);
+  last_.frame.reference = id;
+  last_.frame.landmarks = keyframe.landmarks;
+  last_.T_camera_reference = SE3();
+  tentative_.add_keyframe(id);
 }
 
 void Tracker::restart_clock(double timestamp) {
-  velocity_.reset();
+  last_.velocity.reset();
   waits_since_.reset();
   last_fit_.reset();
-  last_.timestamp = timestamp;
+  tentative_.restart();
+  motion_.restart_clock();
+  last_.frame.timestamp = timestamp;
 }
 
 }  // namespace roslam

@@ -7,6 +7,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -19,9 +20,11 @@
 #include "roslam/matching/projection_matcher.hpp"
 #include "roslam/tracking/initial_pose.hpp"
 #include "roslam/tracking/local_map.hpp"
+#include "roslam/tracking/motion_model.hpp"
 #include "roslam/tracking/pose_check.hpp"
 #include "roslam/tracking/pose_covariance.hpp"
 #include "roslam/tracking/relocaliser.hpp"
+#include "roslam/tracking/tentative_poses.hpp"
 #include "roslam/tracking/tracked_frame.hpp"
 #include "roslam/tracking/tracking_options.hpp"
 
@@ -32,6 +35,7 @@ struct FrameHint {
   std::optional<SE3> T_camera_world;  ///< a prediction beside predicted_pose(), as by optical flow
   double hidden_share = 0.0;          ///< of the image, hidden by dynamic objects
   cv::Mat depth = {};                 ///< CV_32FC1 metres, 0 = unknown; tells what is occluded; may be empty
+  std::vector<std::uint8_t> rested = {};  ///< as RestingPoints: where few points are static
   bool may_start = true;  ///< false where movable objects fill the image, on which no map must start
 
   /// Keyframes similar to the frame, best first; called only to relocalise. May be empty.
@@ -53,14 +57,21 @@ class Tracker {
     GeometricVerifierOptions geometric_verifier;
     RelocaliserOptions relocaliser;
     MeasurementNoise noise;
+    double resting_weight = 0.0;  ///< as DynamicObjectOptions
   };
 
   Tracker(const Camera& camera, Map& map, const Settings& settings);
 
+  /// Inertial samples up to the time of the next frame (seconds), in the order of time; without Camera::imu
+  /// they are ignored. To be called before predicted_pose() and track().
+  void add_inertial(std::span<const InertialSample> samples, double frame_time) {
+    motion_.add_inertial(samples, frame_time);
+  }
+
   /// view: the features of the frame; timestamp: seconds, ascending.
   TrackedFrame track(std::shared_ptr<const ObservedFrame> view, double timestamp, const FrameHint& hint = {});
 
-  /// T_camera_world at that time (seconds) by the motion model; nothing while lost.
+  /// T_camera_world at that time (seconds) by the gyroscope and the motion model; nothing while lost.
   std::optional<SE3> predicted_pose(double timestamp) const;
 
   /// To be called when the last frame became this keyframe, with the landmarks created for it.
@@ -81,6 +92,9 @@ class Tracker {
   /// How many poses were not taken for the true ones so far, by reason.
   const std::map<PoseDoubt, std::size_t>& doubts() const { return doubts_; }
 
+  /// The gyroscope and what is known of its bias; nothing if the camera has none.
+  const std::optional<Gyroscope>& gyroscope() const { return motion_.gyroscope(); }
+
   /// Seconds the last call spent in each step, for the report.
   struct Times {
     double match_frame = 0.0;
@@ -98,6 +112,7 @@ class Tracker {
   bool follow(TrackedFrame& frame, const FrameHint& hint);
   std::vector<SE3> predictions(double timestamp, const std::optional<SE3>& by_flow) const;
   bool accept_best(TrackedFrame& frame, std::vector<PoseCandidate> candidates, const FrameHint& hint);
+  RestingPoints resting_points(const TrackedFrame& frame, const std::vector<std::uint32_t>& used);
   void refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate, KeyframeId near,
                              const cv::Mat& depth);
   PoseDoubt doubt_of(const TrackedFrame& frame, int min_inliers) const;
@@ -107,7 +122,11 @@ class Tracker {
   void match_local_landmarks(TrackedFrame& frame, const cv::Mat& depth);
   bool is_occluded(const Prediction& predicted, const cv::Mat& depth) const;
   void count_found(const TrackedFrame& frame);
-  SE3 predict_pose(double timestamp) const;
+  const TrackedState* confirmed_here(KeyframeId keyframe, double timestamp) const;
+  bool is_poor_fit(const TrackedFrame& frame) const;
+  bool is_strong(const TrackedFrame& frame) const;
+  void reconsider(TrackedFrame& frame);
+  bool contradicts_last(const TrackedFrame& frame);
   void remember(const TrackedFrame& frame);
 
   Camera camera_;
@@ -118,11 +137,13 @@ class Tracker {
   LocalMap local_map_;
   Relocaliser relocaliser_;
   PoseCovariance covariance_;
+  MotionModel motion_;
 
   TrackingState state_ = TrackingState::kInitialising;
-  TrackedFrame last_;                  // the last frame with a pose
-  SE3 T_last_reference_;               // its pose in its reference keyframe, which bundle adjustment may move
-  std::optional<Vector6d> velocity_;   // twist of T_current_last, per second; none: unknown
+  TrackedState last_;  // the last frame with a pose
+  TentativePoses tentative_;
+  std::vector<std::uint8_t> rested_;   // as FrameHint
+  bool is_contradiction_ = false;      // the pose that was accepted last contradicts tentative ones
   std::optional<double> waits_since_;  // seconds; to start a map, for a view that movable objects do not fill
   std::optional<double> last_fit_;     // seconds, of the last frame that was not a poor fit
   int frames_lost_ = 0;

@@ -17,6 +17,7 @@ struct ROSLAM_EXPORT TrackerOptions {
   double max_wait_to_start = 3.0;  ///< seconds for which movable objects that fill the image keep a map from
                                    ///< being started
   double max_predicted = 1.5;      ///< seconds since the last tracked frame for which they are
+  bool use_gyroscope = true;       ///< where the source has one: its rotation is one of the predictions
   int recently_lost_frames = 30;   ///< frames after which recently lost becomes lost
   int new_submap_after_lost = 30;  ///< lost frames that could start a map before a new submap is; 0: never
 
@@ -27,12 +28,15 @@ struct ROSLAM_EXPORT TrackerOptions {
 /// What a pose must fulfil beside its inliers to be taken for the true one. The limits of motion are those of
 /// an agile drone; a vehicle that moves less is guarded better by smaller ones.
 struct ROSLAM_EXPORT PlausibilityOptions {
-  double min_found_share = 0.05;   ///< of the landmarks that the pose puts into view unoccluded
-  double poor_found_share = 0.16;  ///< the same, where matches are off by more than max_pixel_error
-  double max_pixel_error = 1.7;    ///< sigmas, as estimated so far; more are those of blurred images
-  double max_speed = 20.0;         ///< m/s
-  double max_acceleration = 30.0;  ///< m/s^2, change of velocity between two frames
-  double max_turn_rate = 720.0;    ///< degrees/s
+  double min_found_share = 0.05;     ///< of the landmarks that the pose puts into view unoccluded
+  double poor_found_share = 0.16;    ///< the same, where matches are off by more than max_pixel_error
+  double max_pixel_error = 1.7;      ///< sigmas, as estimated so far; more are those of blurred images
+  double max_position_sigma = 0.25;  ///< metres, along the least certain direction
+  double max_rotation_sigma = 5.0;   ///< degrees, about the least certain axis
+  double constrained_sigma = 0.05;   ///< metres; directions less certain are reported as unconstrained
+  double max_speed = 20.0;           ///< m/s
+  double max_acceleration = 30.0;    ///< m/s^2, change of velocity between two frames
+  double max_turn_rate = 720.0;      ///< degrees/s
 
   /// Throws OptionsError naming the field.
   void validate() const;

@@ -20,7 +20,7 @@ constexpr std::string_view kSimulated = "simulated:";
 BenchmarkSequence simulated(const std::string& argument) {
   const std::string flight = argument.substr(kSimulated.size());
   if (!flight_path_from(flight)) {
-    throw InputError(argument + ": no such flight; use simulated:street, :loop, :hover or :turn");
+    throw InputError(argument + ": no such flight; use simulated:street, :loop, :hover, :turn or :corridor");
   }
   return {"simulated-" + flight, argument, "", {}};
 }

@@ -30,7 +30,7 @@ constexpr auto kExamples = R"(Examples:
   A folder of `roslam simulate`, with its camera.yaml; the median error for a script:
     roslam benchmark static --sequences flight --runs 1 --json --out results | jq .sequences[0].median.ate_rmse_m
 
-A sequence is FOLDER, FOLDER:CAMERA (TUM RGB-D) or simulated:street, :loop, :hover, :turn. CAMERA is a preset
+A sequence is FOLDER, FOLDER:CAMERA (TUM RGB-D) or simulated:street, :loop, :hover, :turn, :corridor. CAMERA is a preset
 (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a YAML file; without it --camera is used, else camera.yaml in
 the folder. The ground truth is the folder's groundtruth.txt; without it no accuracy is given ("-").
 Writes to the folder DIR of --out: benchmark.md, benchmark.json, a figure of each sequence, and the folder of

@@ -30,6 +30,7 @@ void for_each_flight_option(Arguments& arguments, const Visitor& visit) {
   visit("aside", arguments.aside);
   visit("fps", arguments.fps);
   visit("gusts", arguments.gusts);
+  visit("imu", arguments.imu);
   visit("gain", arguments.gain);
 }
 }  // namespace
@@ -37,7 +38,8 @@ void for_each_flight_option(Arguments& arguments, const Visitor& visit) {
 CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
   CLI::Option* source = command.add_option("SOURCE", arguments.name,
                                            "Folder in TUM RGB-D format, or simulated:street, "
-                                           "simulated:loop, simulated:hover, simulated:turn");
+                                           "simulated:loop, simulated:hover, simulated:turn, "
+                                           "simulated:corridor");
   command.add_option(
       "--camera", arguments.camera,
       "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file");
@@ -77,6 +79,8 @@ void add_flight_options(CLI::App& command, SourceArguments& arguments) {
       .add_option("--gusts", arguments.gusts,
                   "Gusts of wind of a simulated flight: 0 calm air, 1 turns the drone at up to 60 degrees/s")
       ->capture_default_str();
+  command.add_flag("--imu", arguments.imu,
+                   "A simulated flight has a gyroscope and an accelerometer as well, 200 Hz");
   command.add_option("--gain", arguments.gain, "Factor of the image brightness of a simulated flight")
       ->capture_default_str();
 }
@@ -86,7 +90,8 @@ std::optional<SimulatorOptions> simulated_flight(const SourceArguments& argument
   const auto path = flight_path_from(arguments.name.substr(kSimulated.size()));
   const auto traffic = traffic_level_from(arguments.traffic);
   if (!path)
-    throw InputError(arguments.name + ": no such flight; use simulated:street, :loop, :hover or :turn");
+    throw InputError(arguments.name +
+                     ": no such flight; use simulated:street, :loop, :hover, :turn or :corridor");
   if (!traffic) throw InputError("--traffic " + arguments.traffic + ": use none, light or heavy");
   if (!arguments.camera.empty() && arguments.camera != "simulated") {
     throw InputError("--camera " + arguments.camera +
@@ -102,6 +107,7 @@ std::optional<SimulatorOptions> simulated_flight(const SourceArguments& argument
   options.aside = arguments.aside;
   options.fps = arguments.fps;
   options.gusts = arguments.gusts;
+  options.imu = arguments.imu;
   options.gain = arguments.gain;
   return options;
 }

@@ -39,7 +39,7 @@ constexpr auto kExamples = R"(Examples:
     roslam benchmark dynamic --sequences busy:tum-fr1 --counterparts quiet:tum-fr1 --modes none both \
         --real-time --out results
 
-A sequence is FOLDER, FOLDER:CAMERA (TUM RGB-D) or simulated:street, :loop, :hover, :turn. CAMERA is a preset
+A sequence is FOLDER, FOLDER:CAMERA (TUM RGB-D) or simulated:street, :loop, :hover, :turn, :corridor. CAMERA is a preset
 (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a YAML file; without it --camera is used, else camera.yaml in
 the folder. The ground truth is the folder's groundtruth.txt; without it no accuracy is given ("-").
 The static counterpart of a sequence is the same without dynamic objects: of a simulated flight the one

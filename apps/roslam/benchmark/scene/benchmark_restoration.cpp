@@ -17,7 +17,7 @@ constexpr auto kExamples = R"(Examples:
     roslam benchmark restoration --sequences with_people --truth my_room --truth-depth-units 1000 \
         --out results
 
-A sequence is FOLDER, FOLDER:CAMERA (TUM RGB-D) or simulated:street, :loop, :hover, :turn. The background
+A sequence is FOLDER, FOLDER:CAMERA (TUM RGB-D) or simulated:street, :loop, :hover, :turn, :corridor. The background
 behind its dynamic objects must be known: simulated flights and folders of roslam compose have it; for others
 --truth names a folder of the same frames without dynamic objects.
 Writes to the folder DIR of --out: benchmark.md with tables, benchmark.json, images of each sequence, and the
