@@ -119,9 +119,15 @@ void Flight::go(double length, double turn) {
   }
 }
 
+// Beyond its ends the track goes on straight, as the motion before and after an image is asked for as well.
 Flight::Waypoint Flight::at(double way) const {
   const double last = static_cast<double>(track_.size() - 1);
   const double step = std::clamp(way / kStep, 0.0, last);
+  if (track_.size() > 1 && (way < 0.0 || way > kStep * last)) {
+    const Waypoint& end = way < 0.0 ? track_.front() : track_.back();
+    const double beyond = way < 0.0 ? way : way - kStep * last;
+    return {end.position + beyond * direction(end.heading), end.heading};
+  }
   const auto i = std::min(static_cast<std::size_t>(step), track_.size() - 1);
   if (i + 1 >= track_.size()) return track_.back();
   const double t = step - static_cast<double>(i);

@@ -461,6 +461,10 @@ TEST(SimulatedImu, FeelsGravityAndTheTurnsOfTheFlight) {
   const SE3 begin = flight.T_world_camera(1.0025);
   const SE3 end = flight.T_world_camera(3.0025);
   EXPECT_NEAR(turned.z(), so3_log(end.rotation() * begin.rotation().inverse()).z(), 0.01);
+  // Where the flight begins there is no jerk either.
+  options.path = FlightPath::kStreet;
+  for (const InertialSample& sample : inertial_samples(Flight(options), -0.05, 0.05, options.seed))
+    EXPECT_NEAR(sample.acceleration.norm(), 9.81, 0.6);
   // The same whatever was asked for before.
   const auto again = inertial_samples(flight, 1.9, 2.0, options.seed);
   ASSERT_EQ(again.size(), 20U);

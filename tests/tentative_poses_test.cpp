@@ -162,7 +162,7 @@ TEST_F(RepeatedStructure, LandmarksOfATentativeKeyframeDoNotConfirmIt) {
   ASSERT_GT(still_wrong.inliers, 100);
   ASSERT_NEAR(error(still_wrong, x), kPeriod, 0.01);
   x += 0.01;
-  const TrackedFrame next = track(view(at(x), {unique_, repeated_, copies_}));
+  const TrackedFrame next = track(view(at(x), {unique_, repeated_, copies_, fresh_}));
   ASSERT_EQ(next.state, TrackingState::kTracking);
   EXPECT_LT(error(next, x), 0.01);
   ASSERT_TRUE(next.withdrawal);

@@ -144,8 +144,9 @@ std::optional<SE3> Tracker::predicted_pose(double timestamp) const {
   return motion_.predict(last_, timestamp);
 }
 
-// The candidates by predictions are tried first. Where they are refused, or few inliers support the best, the
-// reference keyframe, by descriptors, and the last frame, in a wide search, give others.
+// The candidates by predictions are tried first. Where they are refused, few inliers support the best, or the
+// last pose is tentative, the reference keyframe, by descriptors, and the last frame, in a wide search, give
+// others.
 bool Tracker::follow(TrackedFrame& frame, const FrameHint& hint) {
   if (!last_.frame.reference.is_valid()) return false;
   const Stopwatch watch;
@@ -161,7 +162,9 @@ bool Tracker::follow(TrackedFrame& frame, const FrameHint& hint) {
     is_trusted |= !candidates.empty() && candidates.back().inliers >= settings_.tracker.trusted_inliers;
   }
   times_.match_frame += watch.seconds();
-  if (is_trusted && accept_best(frame, std::exchange(candidates, {}), hint)) return true;
+  const TrackedState* confirmed = confirmed_here(last_.frame.reference, frame.timestamp);
+  if (is_trusted && confirmed == nullptr && accept_best(frame, std::exchange(candidates, {}), hint))
+    return true;
   const Stopwatch second_watch;
   if (const Keyframe* reference = map_.find(last_.frame.reference))
     add(initial_pose_.from_keyframe(*frame.view, *reference, T_world_last.inverse()));
@@ -170,7 +173,7 @@ bool Tracker::follow(TrackedFrame& frame, const FrameHint& hint) {
                                     predicted.empty() ? T_world_last.inverse() : predicted.front(),
                                     {kWider, rested_}));
   // Tentative poses may be the fault: from the last one before them.
-  if (const TrackedState* confirmed = confirmed_here(last_.frame.reference, frame.timestamp)) {
+  if (confirmed != nullptr) {
     const SE3 T_camera_world = *confirmed->T_camera_world(map_);
     add(initial_pose_.from_last_frame(*frame.view, confirmed->frame, T_camera_world.inverse(), T_camera_world,
                                       {kWider, rested_}));
