@@ -144,9 +144,8 @@ std::optional<SE3> Tracker::predicted_pose(double timestamp) const {
   return motion_.predict(last_, timestamp);
 }
 
-// The candidates by predictions are tried first. Where they are refused, few inliers support the best, or the
-// last pose is tentative, the reference keyframe, by descriptors, and the last frame, in a wide search, give
-// others.
+// The candidates by predictions are tried first. Where they are refused, or few inliers support the best, the
+// reference keyframe, by descriptors, and the last frame, in a wide search, give others.
 bool Tracker::follow(TrackedFrame& frame, const FrameHint& hint) {
   if (!last_.frame.reference.is_valid()) return false;
   const Stopwatch watch;
@@ -159,12 +158,12 @@ bool Tracker::follow(TrackedFrame& frame, const FrameHint& hint) {
   bool is_trusted = false;
   for (const SE3& pose : predicted) {
     add(initial_pose_.from_last_frame(*frame.view, last_.frame, T_world_last, pose, {1.0F, rested_}));
-    is_trusted |= !candidates.empty() && candidates.back().inliers >= settings_.tracker.trusted_inliers;
+    is_trusted |=
+        !candidates.empty() && candidates.back().inliers - of_tentative(candidates.back().landmarks) >=
+                                   settings_.tracker.trusted_inliers;
   }
   times_.match_frame += watch.seconds();
-  const TrackedState* confirmed = confirmed_here(last_.frame.reference, frame.timestamp);
-  if (is_trusted && confirmed == nullptr && accept_best(frame, std::exchange(candidates, {}), hint))
-    return true;
+  if (is_trusted && accept_best(frame, std::exchange(candidates, {}), hint)) return true;
   const Stopwatch second_watch;
   if (const Keyframe* reference = map_.find(last_.frame.reference))
     add(initial_pose_.from_keyframe(*frame.view, *reference, T_world_last.inverse()));
@@ -173,7 +172,7 @@ bool Tracker::follow(TrackedFrame& frame, const FrameHint& hint) {
                                     predicted.empty() ? T_world_last.inverse() : predicted.front(),
                                     {kWider, rested_}));
   // Tentative poses may be the fault: from the last one before them.
-  if (confirmed != nullptr) {
+  if (const TrackedState* confirmed = confirmed_here(last_.frame.reference, frame.timestamp)) {
     const SE3 T_camera_world = *confirmed->T_camera_world(map_);
     add(initial_pose_.from_last_frame(*frame.view, confirmed->frame, T_camera_world.inverse(), T_camera_world,
                                       {kWider, rested_}));
@@ -375,13 +374,17 @@ bool Tracker::is_poor_fit(const TrackedFrame& frame) const {
          frame.inliers < settings_.plausible.poor_found_share * frame.visible;
 }
 
-// Landmarks that tentative poses brought into the map do not confirm them.
-bool Tracker::is_strong(const TrackedFrame& frame) const {
-  const auto of_tentative = std::count_if(frame.landmarks.begin(), frame.landmarks.end(), [&](LandmarkId id) {
+// How many landmarks came into the map by tentative poses, which they do not confirm.
+int Tracker::of_tentative(const std::vector<LandmarkId>& landmarks) const {
+  return static_cast<int>(std::count_if(landmarks.begin(), landmarks.end(), [&](LandmarkId id) {
     const Landmark* landmark = id.is_valid() ? map_.find(id) : nullptr;
     return landmark != nullptr && tentative_.made(landmark->created_by);
-  });
-  return frame.inliers - of_tentative >= settings_.tracker.trusted_inliers && !is_poor_fit(frame);
+  }));
+}
+
+bool Tracker::is_strong(const TrackedFrame& frame) const {
+  return frame.inliers - of_tentative(frame.landmarks) >= settings_.tracker.trusted_inliers &&
+         !is_poor_fit(frame);
 }
 
 // Tentative poses are withdrawn once a strong one contradicts them: it does not fit their motion, or the

@@ -124,6 +124,7 @@ class Tracker {
   void count_found(const TrackedFrame& frame);
   const TrackedState* confirmed_here(KeyframeId keyframe, double timestamp) const;
   bool is_poor_fit(const TrackedFrame& frame) const;
+  int of_tentative(const std::vector<LandmarkId>& landmarks) const;
   bool is_strong(const TrackedFrame& frame) const;
   void reconsider(TrackedFrame& frame);
   bool contradicts_last(const TrackedFrame& frame);
