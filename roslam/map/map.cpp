@@ -196,7 +196,7 @@ void Map::withdraw(KeyframeId id) {
 void Map::remove_withdrawn(KeyframeId id) {
   const Keyframe* keyframe = find(id);
   if (keyframe == nullptr) return;
-  // The newest before it: the frames that refer to it are of its time.
+  // The poses of frames that refer to it are kept relative to the newest other one.
   for (std::uint32_t i = static_cast<std::uint32_t>(keyframes_.size()); i-- > 0;) {
     const Keyframe* other = find(KeyframeId{i});
     const bool is_usable = other != nullptr && i != id.value && other->submap == keyframe->submap &&

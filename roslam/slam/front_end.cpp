@@ -145,10 +145,7 @@ void FrontEnd::remember(const TrackedFrame& frame, const Map& map, const FrontEn
     const bool is_other_submap =
         last_reference_.is_valid() &&
         (!frame.reference.is_valid() || map.submap_of(frame.reference) != map.submap_of(last_reference_));
-    if (is_other_submap) {
-      detector_.leave_submap();
-      noise_.interrupt();
-    }
+    if (is_other_submap) forget_poses();
     last_reference_ = frame.reference;
   }
   noise_.add(frame, depth_, observation.dynamic_objects.mask);

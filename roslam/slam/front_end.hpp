@@ -69,7 +69,7 @@ class FrontEnd {
   /// Ends a wait for labels; there are none any more. May be called from any thread.
   void cancel() { segmentation_.cancel(); }
 
-  /// To be called when poses of earlier frames turned out to be wrong.
+  /// To be called when poses of earlier frames are of no use: they were wrong, or are of another submap.
   void forget_poses();
 
   /// Forgets earlier frames, as after a reset of the source's clock.

@@ -133,12 +133,13 @@ void Slam::Impl::withdraw(const Withdrawal& wrong, FrameResult& result) {
   front_end.forget_poses();
 }
 
-// Removes a keyframe whose pose was withdrawn. False if it is one to go on with.
+// Removes a keyframe whose pose was withdrawn. False if it is there and to be mapped.
 bool Slam::Impl::remove_withdrawn(KeyframeId keyframe) {
   const std::scoped_lock lock(map_mutex);
-  if (map.is_withdrawn(keyframe)) map.remove_withdrawn(keyframe);
+  if (!map.is_withdrawn(keyframe)) return map.find(keyframe) == nullptr;
+  map.remove_withdrawn(keyframe);
   if (needs_poses()) poses.publish(map);
-  return map.is_withdrawn(keyframe) || map.find(keyframe) == nullptr;
+  return true;
 }
 
 void Slam::Impl::check_gyroscope(FrameResult& result) {

@@ -1,23 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/tracking/motion_model.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 namespace roslam {
 
 namespace {
-// Standard deviation of the position along its least certain direction, metres.
-double position_sigma(const Matrix6d& covariance) {
-  const Eigen::Matrix3d position = covariance.topLeftCorner<3, 3>();
-  return std::sqrt(std::max(0.0, position.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
+double position_sigma(const TrackedFrame& frame) {
+  return largest_sigma(frame.measurement_covariance.topLeftCorner<3, 3>());
 }
+}  // namespace
 
 bool is_same_submap(const Map& map, KeyframeId a, KeyframeId b) {
   return a.is_valid() && b.is_valid() && map.submap_of(a) == map.submap_of(b);
 }
-}  // namespace
 
 MotionModel::MotionModel(const Camera& camera, const Map& map, const PlausibilityOptions& plausible,
                          bool use_gyroscope)
@@ -71,10 +68,10 @@ PoseDoubt MotionModel::doubt(const TrackedState& since, const TrackedFrame& fram
   MotionState last;
   last.timestamp = earlier.timestamp;
   last.T_world_camera = since.T_camera_world(map_)->inverse();
-  last.sigma = position_sigma(earlier.measurement_covariance);
+  last.sigma = position_sigma(earlier);
   if (since.velocity) last.velocity = -(last.T_world_camera.rotation() * since.velocity->head<3>());
-  return check_motion(last, frame.timestamp, frame.T_camera_world->inverse(),
-                      position_sigma(frame.measurement_covariance), plausible_);
+  return check_motion(last, frame.timestamp, frame.T_camera_world->inverse(), position_sigma(frame),
+                      plausible_);
 }
 
 Turn MotionModel::turn_since(const TrackedState& since, const TrackedFrame& frame) const {

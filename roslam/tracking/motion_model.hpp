@@ -12,6 +12,9 @@
 
 namespace roslam {
 
+/// Whether both keyframes are valid and of one submap.
+bool is_same_submap(const Map& map, KeyframeId a, KeyframeId b);
+
 /// How the camera moves: predicts poses by constant velocity and, where the camera has one, by its gyroscope,
 /// and says which motions are not plausible. Not thread safe; reads the map.
 class MotionModel {

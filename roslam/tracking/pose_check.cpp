@@ -51,10 +51,11 @@ std::string_view describe(PoseDoubt doubt) {
   return "unknown";
 }
 
+double largest_sigma(const Eigen::Matrix3d& covariance) {
+  return std::sqrt(std::max(0.0, covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
+}
+
 PoseDoubt check_certainty(const Matrix6d& covariance, const PlausibilityOptions& options) {
-  const auto largest_sigma = [](const Eigen::Matrix3d& block) {
-    return std::sqrt(std::max(0.0, block.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
-  };
   const double position = largest_sigma(covariance.topLeftCorner<3, 3>());
   const double rotation = largest_sigma(covariance.bottomRightCorner<3, 3>()) * 180.0 / std::numbers::pi;
   const bool is_certain = position <= options.max_position_sigma && rotation <= options.max_rotation_sigma;

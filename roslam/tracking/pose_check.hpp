@@ -27,6 +27,9 @@ enum class PoseDoubt {
 /// In words, for reports.
 std::string_view describe(PoseDoubt doubt);
 
+/// Standard deviation along the least certain direction, by the covariance of a position or a rotation.
+double largest_sigma(const Eigen::Matrix3d& covariance);
+
 /// Whether the inliers constrain a pose, by its covariance as OptimisedPose gives it.
 PoseDoubt check_certainty(const Matrix6d& covariance, const PlausibilityOptions& options);
 

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/tracking/resting_points.hpp"
 
-#include <cmath>
-
 namespace roslam {
 
 std::vector<TemporaryPoint> match_resting_points(const Map& map, const Camera& camera,
                                                  const std::vector<KeyframeId>& keyframes,
                                                  const ObservedFrame& view, const SE3& T_camera_world,
-                                                 std::vector<LandmarkId> taken, ProjectionMatcher& matcher) {
+                                                 const std::vector<std::uint32_t>& used,
+                                                 ProjectionMatcher& matcher) {
   constexpr float kRadius = 4.0F;  // times matcher.map_radius
   constexpr LandmarkId kTaken{LandmarkId::kNone - 1};
+  std::vector<LandmarkId> taken(view.size());
+  for (const std::uint32_t point : used) taken[point] = kTaken;
   std::vector<TemporaryPoint> result;
   for (const KeyframeId id : keyframes) {
     const Keyframe& keyframe = *map.find(id);

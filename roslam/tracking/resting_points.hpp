@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "roslam/geometry/camera.hpp"
@@ -11,11 +12,12 @@
 namespace roslam {
 
 /// Matches points of a frame with points of keyframes on movable objects at rest, which have depth but no
-/// landmark (ObservedFrame::is_movable). taken: landmark of each point of the frame; those without one are
-/// matched. Positions are those that the keyframe measured. Reads the map.
+/// landmark (ObservedFrame::is_movable). used: points of the frame that are matched already. Positions are
+/// those that the keyframe measured. Reads the map.
 std::vector<TemporaryPoint> match_resting_points(const Map& map, const Camera& camera,
                                                  const std::vector<KeyframeId>& keyframes,
                                                  const ObservedFrame& view, const SE3& T_camera_world,
-                                                 std::vector<LandmarkId> taken, ProjectionMatcher& matcher);
+                                                 const std::vector<std::uint32_t>& used,
+                                                 ProjectionMatcher& matcher);
 
 }  // namespace roslam

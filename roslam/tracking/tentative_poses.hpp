@@ -44,6 +44,8 @@ class TentativePoses {
     return std::find(keyframes_.begin(), keyframes_.end(), keyframe) != keyframes_.end();
   }
 
+  const std::vector<KeyframeId>& keyframes() const { return keyframes_; }  ///< made of tentative poses
+
   /// Withdraws what is tentative. Only if there is something.
   Withdrawal withdraw();
 

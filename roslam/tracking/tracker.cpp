@@ -217,8 +217,8 @@ bool Tracker::is_accepted(const TrackedFrame& frame, int min_inliers) {
 // The last pose before tentative ones, if there are such and it is in the submap of a keyframe.
 const TrackedState* Tracker::confirmed_here(KeyframeId keyframe, double timestamp) const {
   const TrackedState* confirmed = tentative_.confirmed(timestamp);
-  if (confirmed == nullptr || !keyframe.is_valid() || !confirmed->frame.reference.is_valid()) return nullptr;
-  return map_.submap_of(confirmed->frame.reference) == map_.submap_of(keyframe) ? confirmed : nullptr;
+  const bool is_here = confirmed != nullptr && is_same_submap(map_, confirmed->frame.reference, keyframe);
+  return is_here ? confirmed : nullptr;
 }
 
 // By optical flow, by the gyroscope and by the motion model, those that differ. Each may be wrong: flow on
@@ -285,10 +285,8 @@ RestingPoints Tracker::resting_points(const TrackedFrame& frame, const std::vect
   if (settings_.resting_weight <= 0.0 || view.is_movable.empty()) return {{}, 0.0, rested_};
   std::vector<KeyframeId> keyframes = local_map_.keyframes();
   keyframes.resize(std::min(keyframes.size(), kKeyframes));
-  std::vector<LandmarkId> taken = frame.landmarks;
-  for (const std::uint32_t point : used) taken[point] = LandmarkId{LandmarkId::kNone - 1};
   RestingPoints resting{
-      match_resting_points(map_, camera_, keyframes, view, *frame.T_camera_world, std::move(taken), matcher_),
+      match_resting_points(map_, camera_, keyframes, view, *frame.T_camera_world, used, matcher_),
       settings_.resting_weight, rested_};
   // All of them together count no more than what is static.
   const auto all = static_cast<double>(std::max<std::size_t>(1, resting.points.size()));
@@ -376,6 +374,7 @@ bool Tracker::is_poor_fit(const TrackedFrame& frame) const {
 
 // How many landmarks came into the map by tentative poses, which they do not confirm.
 int Tracker::of_tentative(const std::vector<LandmarkId>& landmarks) const {
+  if (tentative_.keyframes().empty()) return 0;
   return static_cast<int>(std::count_if(landmarks.begin(), landmarks.end(), [&](LandmarkId id) {
     const Landmark* landmark = id.is_valid() ? map_.find(id) : nullptr;
     return landmark != nullptr && tentative_.made(landmark->created_by);
