@@ -15,7 +15,7 @@
 #include "roslam/map/map_mutex.hpp"
 #include "roslam/map_io/map_file.hpp"
 #include "roslam/options/options.hpp"
-#include "roslam/slam/settings.hpp"
+#include "roslam/options/settings.hpp"
 #include "tests/loop_scene.hpp"
 
 namespace roslam::benchmarks {
@@ -91,7 +91,7 @@ void close_loop(benchmark::State& state) {
       while (!stop.stop_requested()) {
         const auto asked = Clock::now();
         {
-          const std::scoped_lock lock(mutex);
+          const MapLock lock(mutex, "benchmark");
           longest = std::max(longest.load(), std::chrono::duration<double>(Clock::now() - asked).count());
         }
         std::unique_lock pause(pause_mutex);

@@ -9,6 +9,7 @@ set(ROSLAM_PUBLIC_HEADERS
   geometry/camera.hpp
   geometry/depth_noise.hpp
   geometry/imu_calibration.hpp
+  geometry/mount.hpp
   geometry/se3.hpp
   geometry/trajectory.hpp
   sensors/frame_source.hpp
@@ -33,6 +34,7 @@ set(ROSLAM_PUBLIC_HEADERS
   dynamic_objects/movable_object.hpp
   map/ids.hpp
   map/map.hpp
+  map/map_mutex.hpp
   map/map_ply.hpp
   matching/matcher_options.hpp
   place_recognition/geometric_verifier_options.hpp
@@ -43,6 +45,7 @@ set(ROSLAM_PUBLIC_HEADERS
   loop_closing/closed_loop.hpp
   loop_closing/loop_closing_options.hpp
   map_io/map_file.hpp
+  odometry/odometry.hpp
   map_io/saved_map.hpp
   restoration/inpainter.hpp
   restoration/provenance.hpp
@@ -54,10 +57,11 @@ set(ROSLAM_PUBLIC_HEADERS
   dense/surface_file.hpp
   dense/surface_map.hpp
   slam/frame_result.hpp
+  slam/map_snapshot.hpp
   options/mode.hpp
   slam/open_slam.hpp
   options/options.hpp
-  slam/restored_keyframe.hpp
+  workers/restored_keyframe.hpp
   slam/run.hpp
   slam/slam.hpp
 )

@@ -32,7 +32,7 @@ int main(int argc, char** argv) try {
     std::cerr << "no frame was localised in " << map.string() << ", which stays as it is\n";
     return 1;
   }
-  roslam::save_map(map, slam->snapshot());
+  roslam::save_map(map, slam->saved_map());
   std::cout << slam->trajectory().size() << " poses in a map of " << slam->map().keyframe_count()
             << " keyframes\n";
 } catch (const roslam::Error& error) {

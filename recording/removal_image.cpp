@@ -64,7 +64,8 @@ cv::Vec3b removal_colour(Movable kind) {
 cv::Mat removed_kinds(const DynamicObjects& dynamic_objects, const cv::Size& size) {
   cv::Mat kinds = cv::Mat::zeros(size, CV_8UC1);
   if (dynamic_objects.mask.empty()) return kinds;
-  for (const auto& object : dynamic_objects.objects) draw_object(object, kinds, static_cast<int>(object.kind));
+  for (const auto& object : dynamic_objects.objects)
+    draw_object(object, kinds, static_cast<int>(object.kind));
   // Region growing: each round assigns the margin's pixels next to an object.
   const cv::Mat window = cv::getStructuringElement(cv::MORPH_RECT, {3, 3});
   for (int round = 0; round < std::max(size.width, size.height); ++round) {

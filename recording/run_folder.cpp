@@ -44,11 +44,12 @@ RunFolder::Result RunFolder::if_any(bool is_any, Result otherwise) {
 
 namespace {
 // What a run writes.
-constexpr std::array kResults{"run.json",        "trajectory.txt", "keyframes.txt",     "map.ply",
-                              "map.roslam",      "dense.ply",      "dense.bt",          "trajectory.png",
-                              "groundtruth.txt", "report.html",    "descriptors.jsonl", "masks",
-                              "removal.jpg",     "removal.avi",    "restoration.jpg"};
+constexpr std::array kResults{"run.json",       "trajectory.txt",  "keyframes.txt", "odometry.csv",
+                              "map.ply",        "map.roslam",      "dense.ply",     "dense.bt",
+                              "trajectory.png", "groundtruth.txt", "report.html",   "descriptors.jsonl",
+                              "masks",          "removal.jpg",     "removal.avi",   "restoration.jpg"};
 constexpr const char* kPrevious = "previous";
+constexpr const char* kSessions = "sessions";
 
 bool is_run(const Path& folder) {
   const auto json = nlohmann::json::parse(std::ifstream(folder / "run.json"), nullptr, false);
@@ -72,12 +73,20 @@ bool is_same(const Path& a, const Path& b) {
   return !b.empty() && std::filesystem::equivalent(a, b, error);
 }
 
-// Moves the results of an earlier run to previous/, as a whole: what is there is of the run before and goes.
-// An earlier run that was killed before it wrote any leaves nothing worth that. A device stays where it is.
-void move_away(const Path& folder, const Path& kept) {
+// Where the results of a run that is resumed go.
+Path next_session(const Path& folder) {
   std::error_code error;
-  const Path previous = folder / kPrevious;
-  const std::set<std::string> unfinished{"run.json", "descriptors.jsonl", "masks"};  // written during a run
+  int number = 1;
+  while (std::filesystem::exists(folder / kSessions / std::to_string(number), error)) ++number;
+  return folder / kSessions / std::to_string(number);
+}
+
+// Moves the results of an earlier run to another folder, as a whole: what is there is of the run before and
+// goes. An earlier run that was killed before it wrote any leaves nothing worth that. A device stays where it
+// is.
+void move_away(const Path& folder, const Path& previous, const Path& kept) {
+  std::error_code error;
+  const std::set<std::string> unfinished{"run.json", "descriptors.jsonl", "masks"};  // of no use alone
   const bool has_results = std::any_of(kResults.begin(), kResults.end(), [&](const char* name) {
     return unfinished.count(name) == 0 && is_file_or_folder(folder / name);
   });
@@ -145,7 +154,7 @@ void RunFolder::begin(RunDescription& description, const Camera& camera) const {
       throw OutputError(description.map + ": would be replaced by the results in " + path_.string() +
                         "; copy it or choose another --out");
   }
-  move_away(path_, description.map);
+  move_away(path_, description.resumes ? next_session(path_) : path_ / kPrevious, description.map);
   description.id = new_id();
   write_file(path_ / "run.json", unfinished_report(description, camera));
 }
@@ -162,7 +171,7 @@ void RunFolder::write_flight(const Slam& slam) const {
       {"trajectory.txt", [&](const Path& file) { write_trajectory(file, slam.trajectory()); }},
       {"keyframes.txt", [&](const Path& file) { write_trajectory(file, slam.keyframes()); }},
       // Kept if there is no new map: it may be the map that was loaded.
-      {"map.roslam", [&](const Path& file) { save_map(file, slam.snapshot()); },
+      {"map.roslam", [&](const Path& file) { save_map(file, slam.saved_map()); },
        if_any(has_new_map, Result::kKept)},
   });
 }

@@ -19,8 +19,9 @@ namespace roslam::recording {
 /// Results of a run: the summary of run() and what was recorded beside it.
 struct RunResults : RunSummary {
   double start_up_seconds = -1.0;  ///< from the start of the process to the first pose; negative = no pose
-  std::optional<RemovalTally> removal;  ///< what was removed, where a RemovalLog was kept
-  std::optional<DenseMap> dense;        ///< of Slam::dense_map(), if it was called
+  std::map<std::string, std::size_t> saving_faults;  ///< what could not be saved during the run, by message
+  std::optional<RemovalTally> removal;               ///< what was removed, where a RemovalLog was kept
+  std::optional<DenseMap> dense;                     ///< of Slam::dense_map(), if it was called
 };
 
 /// The inputs of a run, for its report.
@@ -31,6 +32,7 @@ struct RunDescription {
   std::string segmentation_model;             ///< weights file of the segmentation network; empty: not used
   std::string map;                            ///< file of the loaded map; empty: none
   std::map<std::string, std::string> flight;  ///< options of a simulated flight by name; empty: a recording
+  bool resumes = false;                       ///< goes on with the run in the folder
   std::string id;                             ///< of the run; RunFolder::begin() makes one
 };
 
@@ -62,7 +64,8 @@ struct FrameCounts {
 ///   run.json        effective options, counts, times of every stage, memory
 ///   report.html     figures and tables: trajectory, errors, times, images
 /// Results of an earlier run are moved to the subfolder previous/ when a run begins, so that they do not pass
-/// for those of a run that is killed. The folder is locked meanwhile.
+/// for those of a run that is killed; those of a run that is resumed to sessions/1, 2 and so on, and stay.
+/// The folder is locked meanwhile.
 class RunFolder {
  public:
   /// Creates and locks the folder. Throws OutputError, before any work is lost, if it is not writable, is a

@@ -108,7 +108,27 @@ Json times_json(const StageTimes& times) {
                    {"mean", rounded(s.mean_ms, 3)},
                    {"median", rounded(s.median_ms, 3)},
                    {"p95", rounded(s.p95_ms, 3)},
+                   {"p99", rounded(s.p99_ms, 3)},
                    {"max", rounded(s.max_ms, 3)}};
+  }
+  return json;
+}
+
+// Wall time, unlike processor_milliseconds.
+Json latency_json(const Slam& slam) {
+  const MapLockTimes locks = slam.lock_times();
+  Json held = Json::object();
+  for (const auto& [purpose, seconds] : locks.longest_held) held[purpose] = rounded(1e3 * seconds, 3);
+  Json json{{"longest_wait_for_map", rounded(1e3 * locks.longest_wait, 3)},
+            {"waited_for", locks.waited_for},
+            {"longest_hold_of_map", held}};
+  const auto summaries = slam.latency().summary();
+  if (const auto found = summaries.find("latency"); found != summaries.end()) {
+    const StageSummary& s = found->second;
+    json["median"] = rounded(s.median_ms, 3);
+    json["p95"] = rounded(s.p95_ms, 3);
+    json["p99"] = rounded(s.p99_ms, 3);
+    json["max"] = rounded(s.max_ms, 3);
   }
   return json;
 }
@@ -253,6 +273,7 @@ std::string run_report(const Slam& slam, const RunResults& summary, const FrameS
   json["frames"] = frames_json(slam, summary, source);
   json["gave_way"] = counts_json(slam.gave_way());
   json["warnings"] = counts_json(slam.warnings());
+  json["not_saved_during_run"] = counts_json(summary.saving_faults);
   json["noise"] = noise_json(slam.measurement_noise());
   if (const auto gyroscope = slam.gyroscope()) json["gyroscope"] = gyroscope_json(*gyroscope);
   json["dynamic"] = dynamic_json(slam, summary, description);
@@ -271,6 +292,7 @@ std::string run_report(const Slam& slam, const RunResults& summary, const FrameS
   json["start_up_seconds"] = rounded(summary.start_up_seconds, 2);
   json["peak_memory_megabytes"] = rounded(static_cast<double>(peak_memory()) / 1048576.0, 1);
   json["processor_milliseconds"] = times_json(slam.times());
+  json["latency_milliseconds"] = latency_json(slam);
   json["camera"] = camera_json(slam.camera(), description);
   json["options"] = Json::parse(options_to_json(slam.options()));
   return text_of(json);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "roslam/geometry/mount.hpp"
 #include "simulation/simulated_corridor.hpp"
 #include "simulation/simulated_noise.hpp"
 
@@ -167,6 +168,10 @@ SE3 Flight::T_world_camera(double time) const {
        Eigen::AngleAxisd(roll, Vector3d::UnitX()))
           .toRotationMatrix();
   return {Eigen::Matrix3d(R_world_body * R_body_camera), Vector3d(position.x(), position.y(), height)};
+}
+
+SE3 Flight::T_body_camera() const {
+  return mounted_camera({0.0, 0.0, 0.0, 0.0, options_.pitch_down * 180.0 / kPi, 0.0});
 }
 
 }  // namespace roslam::simulation

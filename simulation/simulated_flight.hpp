@@ -17,6 +17,7 @@ class Flight {
 
   double duration() const { return duration_; }  ///< seconds
   SE3 T_world_camera(double time) const;
+  SE3 T_body_camera() const;  ///< how the camera is mounted; sway and gusts turn the body
 
  private:
   struct Waypoint {

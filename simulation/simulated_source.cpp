@@ -24,6 +24,7 @@ Camera camera_for(const SimulatorOptions& options) {
   Camera camera = *camera_preset("simulated");
   camera.fps = options.fps;
   if (options.imu) camera.imu = simulated_imu();
+  camera.T_body_camera = Flight(options).T_body_camera();
   return camera;
 }
 

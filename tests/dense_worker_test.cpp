@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Dense mapping in its own thread: it never blocks the tracker.
-#include "roslam/slam/dense_worker.hpp"
+#include "roslam/workers/dense_worker.hpp"
 
 #include <gtest/gtest.h>
 

@@ -67,7 +67,7 @@ class Fusion : public testing::Test {
   }
 
   int fuse(KeyframeId keyframe, const FusionOptions& options = {}) {
-    return fuse_landmarks(map_, keyframe, camera_, noise_, {}, options);
+    return fuse_landmarks(map_, mutex_, keyframe, camera_, noise_, {}, options);
   }
 
   // Both sides of every observation agree, and no keyframe sees a landmark twice.
@@ -95,6 +95,7 @@ class Fusion : public testing::Test {
   Camera camera_;
   MeasurementNoise noise_;
   Map map_{{1.0F, 1.2F, 1.44F}};
+  MapMutex mutex_;
   std::vector<Point> points_;
 };
 

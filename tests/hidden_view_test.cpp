@@ -12,7 +12,7 @@
 #include "roslam/mapping/local_mapper.hpp"
 #include "roslam/semantics/segmenter.hpp"
 #include "roslam/slam/run.hpp"
-#include "roslam/slam/settings.hpp"
+#include "roslam/options/settings.hpp"
 #include "roslam/tracking/tracker.hpp"
 #include "tests/street_frames.hpp"
 

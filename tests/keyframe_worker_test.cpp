@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The thread that mapping and loop closing run on: order, failures and cancelling.
-#include "roslam/slam/keyframe_worker.hpp"
+#include "roslam/workers/keyframe_worker.hpp"
 
 #include <gtest/gtest.h>
 

@@ -35,7 +35,7 @@ TEST(LongFlight, TheSecondTurnOnTheSpotAddsLittle) {
   EXPECT_LT(slam.map().keyframe_count(), 1.3 * static_cast<double>(keyframes));
   EXPECT_LT(slam.map().landmark_count(), 1.3 * static_cast<double>(landmarks));
   // Bytes a keyframe, its share of the landmarks included.
-  const std::size_t bytes = encode_map(slam.snapshot()).size() / slam.map().keyframe_count();
+  const std::size_t bytes = encode_map(slam.saved_map()).size() / slam.map().keyframe_count();
   EXPECT_LT(bytes, 120'000U);
   RecordProperty("keyframes_first_turn", static_cast<int>(keyframes));
   RecordProperty("keyframes", static_cast<int>(slam.map().keyframe_count()));

@@ -5,7 +5,7 @@
 #include "roslam/loop_closing/loop_closer.hpp"
 #include "roslam/loop_closing/map_correction.hpp"
 #include "roslam/options/options.hpp"
-#include "roslam/slam/settings.hpp"
+#include "roslam/options/settings.hpp"
 #include "tests/loop_scene.hpp"
 
 namespace roslam::scene {

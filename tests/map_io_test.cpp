@@ -11,7 +11,7 @@
 #include "roslam/map_io/map_file.hpp"
 #include "roslam/map_io/merge_maps.hpp"
 #include "roslam/options/options.hpp"
-#include "roslam/slam/settings.hpp"
+#include "roslam/options/settings.hpp"
 #include "tests/loop_scene.hpp"
 #include "tests/scratch.hpp"
 

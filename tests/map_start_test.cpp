@@ -85,7 +85,7 @@ Outcome run(double share, bool labels_everything, double max_wait = 3.0) {
     outcome.error = std::max(outcome.error, error.translation().norm());
   }
   slam.finish();
-  outcome.submaps = slam.snapshot().map.submaps().size();
+  outcome.submaps = slam.saved_map().map.submaps().size();
   return outcome;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Ids, anchors, merging and appending.
 #include "roslam/map/map.hpp"
+#include "roslam/map/map_parts.hpp"
 
 #include <gtest/gtest.h>
 
@@ -280,7 +281,7 @@ TEST_F(AppendedMap, GetsNewNumbersAfterThoseThatExist) {
   map_.begin_session();
   const KeyframeId ours = add_keyframe(map_, 0.0, SubmapId{1});
   map_.add_landmark({0, 0, 2}, ours, 0);
-  map_.append(other_);
+  map_.append(MapParts::of(other_));
   EXPECT_EQ(map_.keyframe_count(), 2U + 5U);
   EXPECT_EQ(map_.keyframe_slots(), 2U + 5U) << "without gaps";
   EXPECT_EQ(map_.landmark_count(), 2U);
@@ -301,7 +302,7 @@ TEST_F(AppendedMap, GetsNewNumbersAfterThoseThatExist) {
 }
 
 TEST_F(AppendedMap, StartsAtZeroInAnEmptyMap) {
-  map_.append(other_);
+  map_.append(MapParts::of(other_));
   EXPECT_EQ(map_.submaps(), (std::vector<SubmapId>{{0}, {1}, {2}}));
   EXPECT_EQ(map_.keyframe_ids(), (std::vector<KeyframeId>{{0}, {1}, {2}, {3}, {4}}));
   EXPECT_EQ(map_.find(KeyframeId{0})->session, 0U);
@@ -311,7 +312,7 @@ TEST_F(AppendedMap, StartsAtZeroInAnEmptyMap) {
 
 TEST_F(AppendedMap, KeepsPosesObservationsAndLoops) {
   for (const double x : {0.0, 0.1, 0.2}) add_keyframe(map_, x);
-  map_.append(other_);
+  map_.append(MapParts::of(other_));
   for (const KeyframeId id : other_.keyframe_ids()) {
     const Keyframe& copy = *map_.find(copy_of(id));
     expect_same(copy.T_camera_world, other_.find(id)->T_camera_world);
@@ -336,7 +337,7 @@ TEST_F(AppendedMap, KeepsPosesObservationsAndLoops) {
 
 TEST_F(AppendedMap, LeavesOutSubmaps) {
   const SubmapId without = other_.find(k_[0])->submap;
-  map_.append(other_, {without});
+  map_.append(MapParts::of(other_, {without}));
   std::size_t others = 0;
   for (const KeyframeId id : other_.keyframe_ids()) {
     const bool is_left_out = other_.find(id)->submap == without;
@@ -351,7 +352,7 @@ TEST_F(AppendedMap, LeavesOutSubmaps) {
 
 TEST_F(AppendedMap, MayBeEmpty) {
   const KeyframeId ours = add_keyframe(map_, 0.0);
-  map_.append(Map({1.0F, 1.2F, 1.44F}));
+  map_.append(MapParts::of(Map({1.0F, 1.2F, 1.44F})));
   EXPECT_EQ(map_.keyframe_ids(), std::vector<KeyframeId>{ours});
   EXPECT_EQ(map_.session(), 0U);
   EXPECT_EQ(map_.new_submap(), SubmapId{1});

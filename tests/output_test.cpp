@@ -9,6 +9,7 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <sstream>
 #include <thread>
 #include <utility>
 
@@ -42,11 +43,34 @@ class Output : public Dataset {
         EXPECT_FALSE(nlohmann::json::parse(bytes, nullptr, false).is_discarded());
       } else if (entry.path().filename() == "report.html") {
         EXPECT_NE(bytes.find("</html>"), std::string::npos);
+      } else if (entry.path().filename() == "odometry.csv") {  // grows by whole lines
+        EXPECT_TRUE(content(whole).starts_with(bytes)) << before;
+        EXPECT_TRUE(bytes.ends_with('\n')) << before;
+      } else if (entry.path().filename() == "trajectory.txt") {  // else as it grew during the run
+        if (bytes != content(whole)) expect_poses_of(whole, bytes);
       } else {
         EXPECT_TRUE(bytes == content(whole)) << before << ": " << entry.path();
       }
     }
     EXPECT_GT(files, 0U) << before;
+  }
+
+  // Each line is a pose of the run, near where the map has it in the end.
+  static void expect_poses_of(const fs::path& whole, const std::string& bytes) {
+    const Trajectory poses = read_trajectory(whole).trajectory;
+    EXPECT_TRUE(bytes.ends_with('\n'));
+    std::istringstream text(bytes);
+    std::string line;
+    std::getline(text, line);  // the header
+    for (std::size_t i = 0; std::getline(text, line); ++i) {
+      std::istringstream numbers(line);
+      double time = 0.0;
+      Eigen::Vector3d position;
+      ASSERT_TRUE(numbers >> time >> position.x() >> position.y() >> position.z()) << line;
+      ASSERT_LT(i, poses.size());
+      EXPECT_EQ(time, poses[i].timestamp);
+      EXPECT_LT((position - poses[i].T_world_camera.translation()).norm(), 0.05);
+    }
   }
 
   void make_whole_run() const {

@@ -20,8 +20,8 @@
 #include "roslam/map/keyframe_pose_table.hpp"
 #include "roslam/mapping/local_mapper.hpp"
 #include "roslam/options/options.hpp"
-#include "roslam/slam/keyframe_worker.hpp"
-#include "roslam/slam/settings.hpp"
+#include "roslam/workers/keyframe_worker.hpp"
+#include "roslam/options/settings.hpp"
 #include "tests/loop_scene.hpp"
 
 namespace roslam::scene {
@@ -63,7 +63,7 @@ class RealTimeLoop : public testing::Test {
   void add(double angle, double drift) {
     KeyframeId id;
     {
-      const std::scoped_lock lock(mutex_);
+      const MapLock lock(mutex_, "test");
       id = flight_.fly_to(WallFlight::on_ring(angle), drift, map_);
       poses_.add(map_, id);
     }
@@ -194,7 +194,7 @@ class RealTimeLoop : public testing::Test {
   }
 
   void publish() {
-    const std::scoped_lock lock(mutex_);
+    const MapLock lock(mutex_, "test");
     poses_.publish(map_);
     // Of this state, or of one that was published later, are the poses of all these keyframes.
     published_ = map_.keyframe_slots();
@@ -235,7 +235,7 @@ class RealTimeLoop : public testing::Test {
 
   // As the tracker does: the keyframes and landmarks around the newest one.
   void read_map() {
-    const std::scoped_lock lock(mutex_);
+    const MapLock lock(mutex_, "test");
     if (map_.keyframe_slots() == 0) return;
     const KeyframeId newest{static_cast<std::uint32_t>(map_.keyframe_slots() - 1)};
     for (const auto& [id, shared] : map_.covisible(map_.T_camera_anchor(newest).first, 15)) {
@@ -287,7 +287,7 @@ TEST_F(RealTimeLoop, TakesTheDriftOutWhileTheMapGrows) {
   constexpr double kDrift = 0.004;
   // A mapper that changes landmarks only: it leaves the drift where it is.
   start(flight_.camera(), [this](KeyframeId id, const auto&, StageTimes&) {
-    const std::scoped_lock lock(mutex_);
+    const MapLock lock(mutex_, "test");
     for (const LandmarkId landmark : map_.find(id)->landmarks) map_.refresh(landmark);
   });
   fly_up_to_the_loop(kDrift);

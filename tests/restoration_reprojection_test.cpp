@@ -135,7 +135,7 @@ TEST_F(Reprojection, FillsDistortedImages) {
   Camera camera = small_camera();
   camera.distortion = {0.12, -0.2, 0.002, -0.001, 0.0};
   // The scene as the distorting camera shows it, resampled from one with a wider view.
-  Camera wide = camera;
+  Camera wide = small_camera();
   wide.distortion = {};
   wide.width = 480;
   wide.height = 360;

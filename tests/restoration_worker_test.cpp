@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Restoration in its own thread: it never blocks the tracker.
-#include "roslam/slam/restoration_worker.hpp"
+#include "roslam/workers/restoration_worker.hpp"
 
 #include <gtest/gtest.h>
 

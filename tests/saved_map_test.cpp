@@ -36,7 +36,7 @@ class SavedMapTest : public Street {
     ASSERT_EQ(in_a.size(), in_b.size());
     for (std::size_t i = 0; i < in_a.size(); ++i)
       EXPECT_EQ(in_a[i].T_world_camera.matrix(), in_b[i].T_world_camera.matrix()) << i;
-    EXPECT_TRUE(encode_map(a.snapshot()) == encode_map(b.snapshot()));
+    EXPECT_TRUE(encode_map(a.saved_map()) == encode_map(b.saved_map()));
   }
 
   ~SavedMapTest() override { fs::remove_all(file_); }
@@ -46,17 +46,17 @@ class SavedMapTest : public Street {
 TEST_F(SavedMapTest, TrackingAndMappingGoOnBitByBitAsInTheMapThatWasNeverSaved) {
   const auto first = slam_with();
   feed(*first, 0, 30);
-  save_map(file_, first->snapshot());
+  save_map(file_, first->saved_map());
   for (const bool localises_only : {false, true}) {
     const auto kept = slam_with(localises_only);
-    kept->load_map(first->snapshot());
+    kept->load_map(first->saved_map());
     feed(*kept, 30, kEnd);
     const auto loaded = slam_with(localises_only);
     loaded->load_map(load_map(file_));
     feed(*loaded, 30, kEnd);
     EXPECT_EQ(kept->trajectory().size(), kBeforeGap - 30 + kEnd - kGapEnd);
     expect_same(*kept, *loaded);
-    for (const BagOfWords& words : kept->snapshot().words) EXPECT_FALSE(words.empty());
+    for (const BagOfWords& words : kept->saved_map().words) EXPECT_FALSE(words.empty());
     EXPECT_TRUE(kept->found_in_loaded_map());
     if (!localises_only) continue;
     EXPECT_EQ(kept->map().keyframe_count(), first->map().keyframe_count());
@@ -71,7 +71,7 @@ TEST_F(SavedMapTest, WithoutAMapThereIsNothingToLocaliseIn) {
 TEST_F(SavedMapTest, AMapOfAnotherCameraIsRefused) {
   const auto first = slam_with();
   feed(*first, 0, 5);
-  SavedMap saved = first->snapshot();
+  SavedMap saved = first->saved_map();
   saved.camera.cx += 1.0;
   EXPECT_THROW(slam_with()->load_map(std::move(saved)), InputError);
 }

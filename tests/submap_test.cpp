@@ -88,7 +88,7 @@ TEST_F(NewSubmap, OfAnotherFlightJoinsTheMapThatItWentOnFrom) {
   const SE3 T_map_first = first->trajectory().front().T_world_camera;
 
   const auto second = make_slam();
-  second->load_map(first->snapshot());
+  second->load_map(first->saved_map());
   for (std::size_t i = kLost; i < frames_->size(); ++i) {
     ASSERT_TRUE(second->process((*frames_)[i]).is_used());
     // Neither before a new submap is started nor within it.

@@ -73,6 +73,7 @@ class NewLandmarks : public testing::Test {
   Camera camera_;
   MeasurementNoise noise_;
   Map map_{{1.0F, 1.2F, 1.44F}};
+  MapMutex mutex_;
 };
 
 class LandmarksFromDepth : public NewLandmarks {
@@ -141,7 +142,7 @@ class LandmarksFromTwoViews : public NewLandmarks {
   }
 
   std::vector<LandmarkId> triangulate_all(const NewLandmarkOptions& options = {}) {
-    return landmarks_from_triangulation(map_, newer_, camera_, noise_, {}, options);
+    return landmarks_from_triangulation(map_, mutex_, newer_, camera_, noise_, {}, options);
   }
 
   // One point, given in the camera frame of the older keyframe, and an offset of where the newer one sees it.

@@ -23,8 +23,8 @@
 #include "roslam/map_io/map_file.hpp"
 #include "roslam/map_io/merge_maps.hpp"
 #include "roslam/options/options.hpp"
+#include "roslam/options/settings.hpp"
 #include "roslam/place_recognition/vocabulary.hpp"
-#include "roslam/slam/settings.hpp"
 
 namespace roslam::app {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/roslam/flight.hpp"
+#include "apps/roslam/run/flight.hpp"
 #include "apps/roslam/support/backend_option.hpp"
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/inpainter.hpp"
@@ -23,8 +23,8 @@
 #include "roslam/common/error.hpp"
 #include "roslam/common/stopwatch.hpp"
 #include "roslam/common/write_file.hpp"
+#include "roslam/options/settings.hpp"
 #include "roslam/sensors/tum_source.hpp"
-#include "roslam/slam/settings.hpp"
 #include "simulation/simulated_source.hpp"
 
 namespace roslam::app {

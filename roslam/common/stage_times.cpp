@@ -25,7 +25,7 @@ std::map<std::string, StageSummary> StageTimes::summary() const {
     };
     const double mean =
         1e3 * std::accumulate(sorted.begin(), sorted.end(), 0.0) / static_cast<double>(sorted.size());
-    result[stage] = {sorted.size(), mean, quantile(0.5), quantile(0.95), 1e3 * sorted.back()};
+    result[stage] = {sorted.size(), mean, quantile(0.5), quantile(0.95), quantile(0.99), 1e3 * sorted.back()};
   }
   return result;
 }

@@ -16,10 +16,11 @@ struct ROSLAM_EXPORT StageSummary {
   double mean_ms = 0.0;
   double median_ms = 0.0;
   double p95_ms = 0.0;
+  double p99_ms = 0.0;
   double max_ms = 0.0;
 };
 
-/// Times of the stages of a run: processor time of the thread that ran them.
+/// Times of the stages of a run: processor time of the thread that ran them, unless said otherwise.
 class ROSLAM_EXPORT StageTimes {
  public:
   void add(const std::string& stage, double seconds) { samples_[stage].push_back(seconds); }

@@ -311,7 +311,7 @@ DynamicObjects DynamicObjectDetector::compose_masks(const CellScene& scene) {
   dilated(part, margin).copyTo(part);
   dynamic_objects.mask = mask;
   dynamic_objects.resting = resting;
-  dynamic_objects.still = still_part(scene, mask);
+  if (settings_.dynamic_objects.resting_weight > 0.0) dynamic_objects.still = still_part(scene, mask);
   return dynamic_objects;
 }
 

@@ -60,6 +60,9 @@ void Camera::validate() const {
           "depth_units_per_metre must be positive, got " + std::to_string(depth_units_per_metre) + "; " +
               std::string(usual_depth_units()));
   if (imu) imu->validate();
+  constexpr double kFar = 10.0;  // metres; more is a wrong unit
+  require(T_body_camera.is_finite() && T_body_camera.translation().norm() <= kFar,
+          "T_body_camera must be a rigid transform of at most 10 m");
   if (depth_noise) {
     const auto [constant, growth] = *depth_noise;
     require(constant >= 0.0 && constant < 10.0 && growth >= 0.0 && growth < 10.0 && constant + growth > 0.0,

@@ -12,6 +12,8 @@
 #include "roslam/common/export.hpp"
 #include "roslam/geometry/depth_noise.hpp"
 #include "roslam/geometry/imu_calibration.hpp"
+#include "roslam/geometry/mount.hpp"
+#include "roslam/geometry/se3.hpp"
 
 namespace roslam {
 
@@ -29,6 +31,7 @@ struct ROSLAM_EXPORT Camera {
   double fps = 30.0;                           ///< frames a second
   std::optional<DepthNoise> depth_noise = {};  ///< if known; where images begin to show it that counts
   std::optional<ImuCalibration> imu = {};      ///< of the inertial measurement unit fixed to it, if any
+  SE3 T_body_camera = forward_camera();        ///< how it is mounted; the body is x forward, y left, z up
 
   /// Throws CalibrationError naming the field that is out of range. depth_units_per_metre may be 0 (not set):
   /// depth in metres needs none, and a source of 16-bit depth refuses it.
@@ -73,9 +76,9 @@ ROSLAM_EXPORT std::string_view usual_depth_units();
 
 /// Reads a camera file (YAML: model, width, height, fx, fy, cx, cy, distortion, depth_units_per_metre, fps,
 /// depth_noise: {constant, growth}, imu: {T_camera_imu: 16 numbers, row by row, gyroscope_noise,
-/// gyroscope_walk}); only model, distortion, fps (30), depth_noise and imu have defaults.
-/// distortion: k1 k2 p1 p2 k3, k1 k2 p1 p2, k1 k2, or none. Throws InputError for a missing or malformed file
-/// or an unknown key, CalibrationError as validate does.
+/// gyroscope_walk}, T_body_camera: 16 numbers, row by row); only model, distortion, fps (30), depth_noise,
+/// imu and T_body_camera have defaults. distortion: k1 k2 p1 p2 k3, k1 k2 p1 p2, k1 k2, or none. Throws
+/// InputError for a missing or malformed file or an unknown key, CalibrationError as validate does.
 ROSLAM_EXPORT Camera read_camera(const std::filesystem::path& file);
 
 /// A preset name or a camera file. Throws as read_camera does.

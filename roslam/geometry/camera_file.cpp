@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <map>
+#include <numbers>
 #include <set>
 
 #include "roslam/common/error.hpp"
@@ -12,13 +13,13 @@ namespace {
 std::map<std::string, Camera, std::less<>> presets() {
   const auto make = [](double fx, double fy, double cx, double cy, std::array<double, 5> distortion,
                        double units, DepthNoise noise) {
-    return Camera{640, 480, fx, fy, cx, cy, distortion, units, 30.0, noise};
+    return Camera{640, 480, fx, fy, cx, cy, distortion, units, 30.0, noise, {}, forward_camera()};
   };
   // TUM: calibration published with the RGB-D benchmark. RealSense: typical factory values of the colour
   // stream at 640x480 with depth aligned to colour; calibrate your own camera for the best accuracy. Depth
   // noise: as DepthNoiseEstimator finds it in recordings of these cameras; d455: of its baseline of 95 mm.
   constexpr DepthNoise kKinect{0.0005, 0.0026};
-  return {
+  std::map<std::string, Camera, std::less<>> all{
       {"tum-fr1",
        make(517.3, 516.5, 318.6, 255.3, {0.2624, -0.9531, -0.0054, 0.0026, 1.1633}, 5000, kKinect)},
       {"tum-fr2",
@@ -29,6 +30,8 @@ std::map<std::string, Camera, std::less<>> presets() {
       {"d455", make(385.0, 385.0, 320.0, 240.0, {}, 1000, {0.0005, 0.0022})},
       {"simulated", make(385.0, 385.0, 319.5, 239.5, {}, 1000, {0.0005, 0.0022})},
   };
+  all.at("simulated").T_body_camera = mounted_camera({0, 0, 0, 0, 0.26 * 180.0 / std::numbers::pi, 0});
+  return all;
 }
 
 std::string joined(const std::vector<std::string>& names) {
@@ -62,9 +65,9 @@ class CameraFile {
 };
 
 void reject_unknown_keys(const std::filesystem::path& path, const YAML::Node& node) {
-  const std::set<std::string> known{"model",       "width", "height",     "fx",  "fy",
-                                    "cx",          "cy",    "distortion", "fps", "depth_units_per_metre",
-                                    "depth_noise", "imu"};
+  const std::set<std::string> known{"model",       "width", "height",       "fx",  "fy",
+                                    "cx",          "cy",    "distortion",   "fps", "depth_units_per_metre",
+                                    "depth_noise", "imu",   "T_body_camera"};
   std::set<std::string> seen;
   for (const auto& entry : node) {
     if (!entry.first.IsScalar())
@@ -75,7 +78,7 @@ void reject_unknown_keys(const std::filesystem::path& path, const YAML::Node& no
       throw InputError(path.string() + ": '" + key + "' is given twice; remove one");
     if (!known.contains(key)) {
       throw InputError(path.string() + ": unknown key '" + key + "'; known: model width height fx fy cx cy " +
-                       "distortion depth_units_per_metre fps depth_noise imu");
+                       "distortion depth_units_per_metre fps depth_noise imu T_body_camera");
     }
   }
 }
@@ -86,6 +89,26 @@ DepthNoise depth_noise_of(const std::filesystem::path& path, const YAML::Node& n
     throw InputError(path.string() + ": depth_noise must be {constant: METRES, growth: PER_METRE}");
   const CameraFile read(path, node);
   return {read.get<double>("constant"), read.get<double>("growth")};
+}
+
+// A rigid transform as 16 numbers, row by row. name: of the key, for messages.
+SE3 transform_of(const std::filesystem::path& path, const std::string& name,
+                 const std::vector<double>& values) {
+  constexpr double kRounding = 1e-3;
+  if (values.size() == 16) {
+    const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
+    const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
+    const bool is_rigid = T.allFinite() && (R * R.transpose()).isIdentity(kRounding) &&
+                          R.determinant() > 0.0 && T.row(3).isApprox(Eigen::RowVector4d::Unit(3));
+    if (is_rigid) return {R, T.topRightCorner<3, 1>()};
+  }
+  throw CalibrationError(path.string() + ": " + name +
+                         " is no rigid transform; give the 4x4 matrix row by row, whose last row is 0 0 0 1");
+}
+
+void write_transform(YAML::Emitter& out, const char* key, const SE3& transform) {
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> T = transform.matrix();
+  out << YAML::Key << key << YAML::Value << YAML::Flow << std::vector<double>(T.data(), T.data() + T.size());
 }
 
 ImuCalibration imu_of(const std::filesystem::path& path, const YAML::Node& node) {
@@ -100,28 +123,15 @@ ImuCalibration imu_of(const std::filesystem::path& path, const YAML::Node& node)
       throw InputError(path.string() + form + ", and has '" + key + "'");
   }
   const CameraFile read(path, node);
-  const auto values = read.get<std::vector<double>>("T_camera_imu");
-  if (values.size() != 16) throw InputError(path.string() + form);
-  const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
-  const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
-  constexpr double kRounding = 1e-3;
-  const bool is_rigid = (R * R.transpose()).isIdentity(kRounding) && R.determinant() > 0.0 &&
-                        T.row(3).isApprox(Eigen::RowVector4d::Unit(3));
-  if (!is_rigid)
-    throw CalibrationError(path.string() +
-                           ": imu.T_camera_imu is no rigid transform; give the 4x4 matrix "
-                           "row by row, whose last row is 0 0 0 1");
-  imu.T_camera_imu = SE3(R, T.topRightCorner<3, 1>());
+  imu.T_camera_imu = transform_of(path, "imu.T_camera_imu", read.get<std::vector<double>>("T_camera_imu"));
   imu.gyroscope_noise = read.get<double>("gyroscope_noise", imu.gyroscope_noise);
   imu.gyroscope_walk = read.get<double>("gyroscope_walk", imu.gyroscope_walk);
   return imu;
 }
 
 void write(YAML::Emitter& out, const ImuCalibration& imu) {
-  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> T = imu.T_camera_imu.matrix();
   out << YAML::Key << "imu" << YAML::Value << YAML::BeginMap;
-  out << YAML::Key << "T_camera_imu" << YAML::Value << YAML::Flow
-      << std::vector<double>(T.data(), T.data() + T.size());
+  write_transform(out, "T_camera_imu", imu.T_camera_imu);
   out << YAML::Key << "gyroscope_noise" << YAML::Value << imu.gyroscope_noise;
   out << YAML::Key << "gyroscope_walk" << YAML::Value << imu.gyroscope_walk;
   out << YAML::EndMap;
@@ -176,6 +186,9 @@ Camera read_camera(const std::filesystem::path& file) {
   camera.fps = read.get<double>("fps", camera.fps);
   if (node["depth_noise"]) camera.depth_noise = depth_noise_of(file, node["depth_noise"]);
   if (node["imu"]) camera.imu = imu_of(file, node["imu"]);
+  if (node["T_body_camera"])
+    camera.T_body_camera =
+        transform_of(file, "T_body_camera", read.get<std::vector<double>>("T_body_camera"));
   try {
     camera.validate();
   } catch (const CalibrationError& error) {
@@ -210,6 +223,7 @@ std::string camera_to_yaml(const Camera& camera) {
         << camera.depth_noise->growth << YAML::EndMap;
   }
   if (camera.imu) write(out, *camera.imu);
+  if (camera.T_body_camera != forward_camera()) write_transform(out, "T_body_camera", camera.T_body_camera);
   out << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
 }

@@ -15,10 +15,4 @@ void ImuCalibration::validate() const {
     throw CalibrationError("camera calibration: imu.gyroscope_walk must be 0 to 1 rad/s^2/sqrt(Hz)");
 }
 
-bool ImuCalibration::operator==(const ImuCalibration& other) const {
-  return T_camera_imu.rotation().coeffs() == other.T_camera_imu.rotation().coeffs() &&
-         T_camera_imu.translation() == other.T_camera_imu.translation() &&
-         gyroscope_noise == other.gyroscope_noise && gyroscope_walk == other.gyroscope_walk;
-}
-
 }  // namespace roslam

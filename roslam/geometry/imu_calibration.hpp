@@ -15,7 +15,7 @@ struct ROSLAM_EXPORT ImuCalibration {
   /// Throws CalibrationError naming the field that is out of range.
   void validate() const;
 
-  bool operator==(const ImuCalibration& other) const;
+  bool operator==(const ImuCalibration&) const = default;
 };
 
 }  // namespace roslam

@@ -50,6 +50,10 @@ class ROSLAM_EXPORT SE3 {
   const Eigen::Vector3d& translation() const { return translation_; }
   Eigen::Matrix4d matrix() const;
 
+  bool operator==(const SE3& other) const {
+    return rotation_.coeffs() == other.rotation_.coeffs() && translation_ == other.translation_;
+  }
+
   /// Rotation angle in radians, in [0, pi].
   double angle() const { return so3_log(rotation_).norm(); }
   bool is_finite() const { return rotation_.coeffs().allFinite() && translation_.allFinite(); }

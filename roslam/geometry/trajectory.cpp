@@ -131,6 +131,10 @@ TrajectoryFile read_trajectory(const std::filesystem::path& file) {
     const std::string_view content = std::string_view(line).substr(0, line.find('#'));
     if (content.find_first_not_of(kSeparators) == std::string_view::npos) continue;
     const auto row = parse_row(content);
+    if (!row && in.eof() && !result.trajectory.empty()) {  // of a program that was killed while it wrote
+      ++result.skipped;
+      break;
+    }
     if (!row) {
       throw InputError(file.string() + ":" + std::to_string(number) +
                        ": not eight numbers 'timestamp tx ty tz qx qy qz qw'; correct or remove the line");
@@ -151,18 +155,25 @@ TrajectoryFile read_trajectory(const std::filesystem::path& file) {
   return result;
 }
 
-void write_trajectory(const std::filesystem::path& file, const Trajectory& trajectory) {
-  std::string text = "# timestamp tx ty tz qx qy qz qw\n";
-  for (const auto& [timestamp, pose] : trajectory) {
-    append_number(text, timestamp, kTimeDecimals);
-    const Eigen::Vector4d rotation = canonical_coefficients(pose.rotation());
-    for (const double value : {pose.translation().x(), pose.translation().y(), pose.translation().z(),
-                               rotation[0], rotation[1], rotation[2], rotation[3]}) {
-      text += ' ';
-      append_number(text, value, kPoseDecimals);
-    }
-    text += '\n';
+std::string trajectory_header() { return "# timestamp tx ty tz qx qy qz qw\n"; }
+
+std::string trajectory_line(const StampedPose& stamped) {
+  const auto& [timestamp, pose] = stamped;
+  std::string text;
+  append_number(text, timestamp, kTimeDecimals);
+  const Eigen::Vector4d rotation = canonical_coefficients(pose.rotation());
+  for (const double value : {pose.translation().x(), pose.translation().y(), pose.translation().z(),
+                             rotation[0], rotation[1], rotation[2], rotation[3]}) {
+    text += ' ';
+    append_number(text, value, kPoseDecimals);
   }
+  text += '\n';
+  return text;
+}
+
+void write_trajectory(const std::filesystem::path& file, const Trajectory& trajectory) {
+  std::string text = trajectory_header();
+  for (const StampedPose& pose : trajectory) text += trajectory_line(pose);
   write_file(file, text);
 }
 

@@ -29,14 +29,19 @@ ROSLAM_EXPORT std::optional<StampedPose> pose_at(const Trajectory& trajectory, d
 
 /// Result of read_trajectory.
 struct ROSLAM_EXPORT TrajectoryFile {
-  Trajectory trajectory;    ///< sorted by time; quaternions normalised
-  std::size_t skipped = 0;  ///< lines ignored: NaN, quaternion far from unit length, repeated time
+  Trajectory trajectory;  ///< sorted by time; quaternions normalised
+  /// Lines ignored: NaN, quaternion far from unit length, repeated time, a last line that was cut off.
+  std::size_t skipped = 0;
 };
 
 /// Reads a TUM trajectory: lines of "timestamp tx ty tz qx qy qz qw", # starts a comment.
 /// Throws InputError naming file and line for a missing file, a line that is not eight numbers, or no pose at
 /// all.
 ROSLAM_EXPORT TrajectoryFile read_trajectory(const std::filesystem::path& file);
+
+/// The first line of a TUM trajectory, and one of a pose.
+ROSLAM_EXPORT std::string trajectory_header();
+ROSLAM_EXPORT std::string trajectory_line(const StampedPose& pose);
 
 /// Writes a TUM trajectory, one pose a line: six decimals for the time, nine for the pose. Equal poses give
 /// equal bytes. Throws OutputError if the file cannot be written in full.

@@ -30,7 +30,7 @@ std::optional<EssentialGraph> EssentialGraph::of(const Map& map, MapMutex& map_m
   std::vector<SubmapId> submaps;
   std::vector<LoopClosure> loops;
   {
-    const std::scoped_lock lock(map_mutex);
+    const MapLock lock(map_mutex, "reading for the pose graph");
     if (map.find(closing.from) == nullptr || map.find(closing.to) == nullptr) return std::nullopt;
     result.keyframes = map.keyframe_ids();
     node_of.resize(map.keyframe_slots(), kNone);
@@ -51,7 +51,7 @@ std::optional<EssentialGraph> EssentialGraph::of(const Map& map, MapMutex& map_m
   };
   std::map<SubmapId, std::size_t> newest;  // node of each submap so far
   for (std::size_t begin = 0; begin < nodes.size(); begin += kPerLock) {
-    const std::scoped_lock lock(map_mutex);
+    const MapLock lock(map_mutex, "reading for the pose graph");
     for (std::size_t node = begin; node < std::min(begin + kPerLock, nodes.size()); ++node) {
       const std::size_t first_edge = edges.size();
       bool has_parent = false;

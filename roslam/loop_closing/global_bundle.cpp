@@ -14,7 +14,7 @@ GlobalBundle GlobalBundle::of(const Map& map, MapMutex& map_mutex, const Measure
   std::vector<std::size_t> pose_of;
   std::vector<LandmarkId> candidates;
   {
-    const std::scoped_lock lock(map_mutex);
+    const MapLock lock(map_mutex, "reading for global bundle adjustment");
     pose_of.resize(map.keyframe_slots());
     const std::set<KeyframeId> origins = map.origins();
     for (const KeyframeId id : map.keyframe_ids()) {
@@ -31,7 +31,7 @@ GlobalBundle GlobalBundle::of(const Map& map, MapMutex& map_mutex, const Measure
   for (std::size_t begin = 0; begin < candidates.size(); begin += kPerLock) {
     result.problem.terms.insert(result.problem.terms.end(), terms.begin(), terms.end());
     terms.clear();
-    const std::scoped_lock lock(map_mutex);
+    const MapLock lock(map_mutex, "reading for global bundle adjustment");
     for (std::size_t i = begin; i < std::min(begin + kPerLock, candidates.size()); ++i) {
       const Landmark* landmark = map.find(candidates[i]);
       if (landmark == nullptr) continue;

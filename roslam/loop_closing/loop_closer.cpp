@@ -49,14 +49,14 @@ void LoopCloser::process(KeyframeId keyframe, const std::function<bool()>& shoul
 std::optional<DetectedLoop> LoopCloser::recognise(KeyframeId keyframe) {
   std::shared_ptr<const ObservedFrame> view;
   {
-    const std::scoped_lock lock(map_mutex_);
+    const MapLock lock(map_mutex_, "place recognition");
     const Keyframe* current = map_.find(keyframe);
     if (current == nullptr) return std::nullopt;
     view = current->view;
   }
   BagOfWords bag = keyframe_database_.describe(*view);
   {
-    const std::scoped_lock lock(map_mutex_);
+    const MapLock lock(map_mutex_, "place recognition");
     // Drops culled keyframes, so that the database grows with the map and not with time.
     keyframe_database_.retain([this](KeyframeId id) { return map_.find(id) != nullptr; });
     keyframe_database_.add(keyframe, std::move(bag));
@@ -66,7 +66,7 @@ std::optional<DetectedLoop> LoopCloser::recognise(KeyframeId keyframe) {
 
 // False if both keyframes are of one submap.
 bool LoopCloser::merge_submaps(const DetectedLoop& loop) {
-  const std::scoped_lock lock(map_mutex_);
+  const MapLock lock(map_mutex_, "merging of submaps");
   const Keyframe* keyframe = map_.find(loop.keyframe);
   const Keyframe* matched = map_.find(loop.match.matched_keyframe);
   if (keyframe == nullptr || matched == nullptr || keyframe->submap == matched->submap) return false;
@@ -110,12 +110,12 @@ bool LoopCloser::correct_loop(const DetectedLoop& loop, const std::function<bool
   // A wrong loop contradicts the other edges, so its error stays large.
   if (edge_error(essential.graph, essential.graph.edges.back(), settings_.pose_graph).norm() >
       settings_.closer.max_error) {
-    const std::scoped_lock lock(map_mutex_);
+    const MapLock lock(map_mutex_, "loop correction");
     ++refused_;
     return false;
   }
   const MapCorrection correction = essential.correction(before);
-  const std::scoped_lock lock(map_mutex_);
+  const MapLock lock(map_mutex_, "loop correction");
   if (map_.find(closing.from) == nullptr || map_.find(closing.to) == nullptr) return false;
   const SE3 T_camera_old = map_.find(closing.to)->T_camera_world;
   correction.apply_to(map_);
@@ -128,7 +128,7 @@ bool LoopCloser::correct_loop(const DetectedLoop& loop, const std::function<bool
 void LoopCloser::fuse(const DetectedLoop& loop) {
   std::vector<KeyframeId> neighbourhood{loop.keyframe};
   {
-    const std::scoped_lock lock(map_mutex_);
+    const MapLock lock(map_mutex_, "fusion after a loop");
     const Keyframe* keyframe = map_.find(loop.keyframe);
     if (keyframe == nullptr) return;
     for (const auto& [neighbour, shared] : map_.covisible(loop.keyframe, settings_.detector.min_shared))
@@ -145,9 +145,8 @@ void LoopCloser::fuse(const DetectedLoop& loop) {
     }
   }
   for (const KeyframeId id : neighbourhood) {
-    const std::scoped_lock lock(map_mutex_);
-    if (map_.find(id) == nullptr) continue;
-    fuse_landmarks(map_, id, camera_, settings_.place.noise, settings_.place.matcher, settings_.fusion);
+    fuse_landmarks(map_, map_mutex_, id, camera_, settings_.place.noise, settings_.place.matcher,
+                   settings_.fusion);
   }
 }
 
@@ -159,7 +158,7 @@ void LoopCloser::adjust_all(const std::function<bool()>& should_stop) {
   options.iterations = settings_.closer.bundle_iterations;
   if (!adjust_bundle(camera_, bundle.problem, options, should_stop).is_usable) return;
   const MapCorrection correction = bundle.correction(before);
-  const std::scoped_lock lock(map_mutex_);
+  const MapLock lock(map_mutex_, "result of global bundle adjustment");
   correction.apply_to(map_);
 }
 

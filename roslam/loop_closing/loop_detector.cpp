@@ -60,7 +60,7 @@ std::optional<DetectedLoop> LoopDetector::detect(const Map& map, const KeyframeD
   std::shared_ptr<const ObservedFrame> view;
   std::vector<KeyframeSnapshot> candidates;
   {
-    const std::scoped_lock lock(map_mutex);
+    const MapLock lock(map_mutex, "loop detection");
     const Keyframe* current = map.find(keyframe);
     if (current == nullptr) return std::nullopt;
     view = current->view;
@@ -73,7 +73,7 @@ std::optional<DetectedLoop> LoopDetector::detect(const Map& map, const KeyframeD
   for (const KeyframeSnapshot& candidate : candidates) {
     auto match = verifier_.recognise(candidate, *view);
     if (!match) continue;
-    const std::scoped_lock lock(map_mutex);
+    const MapLock lock(map_mutex, "loop detection");
     if (map.find(keyframe) == nullptr) return std::nullopt;
     if (!verifier_.confirm(map, *view, *match, options_.min_inliers)) continue;
     if (!is_plausible(map, keyframe, *match)) continue;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "roslam/common/error.hpp"
+#include "roslam/map/map_parts.hpp"
 
 namespace roslam {
 
@@ -54,40 +55,41 @@ LandmarkId Map::insert(Landmark landmark) {
   return landmarks_.back()->id;
 }
 
-void Map::append(const Map& other, const std::set<SubmapId>& without) {
-  std::vector<KeyframeId> theirs_kept;
-  for (const KeyframeId id : other.keyframe_ids()) {
-    if (without.count(other.find(id)->submap) == 0) theirs_kept.push_back(id);
-  }
+void Map::append(const MapParts& other) {
   // Submaps and sessions are renumbered without gaps, too.
   std::map<SubmapId, SubmapId> submap_of;
   std::map<std::uint32_t, std::uint32_t> session_of;
-  for (const KeyframeId id : theirs_kept) {
-    submap_of[other.find(id)->submap];
-    session_of[other.find(id)->session];
+  for (const Keyframe& keyframe : other.keyframes) {
+    submap_of[keyframe.submap];
+    session_of[keyframe.session];
   }
   std::uint32_t next_submap = keyframe_count_ > 0 ? newest_submap_ + 1 : 0;
   std::uint32_t next_session = keyframe_count_ > 0 ? session_ + 1 : 0;
   for (auto& [theirs, ours] : submap_of) ours = SubmapId{next_submap++};
   for (auto& [theirs, ours] : session_of) ours = next_session++;
-  std::vector<KeyframeId> id_of(other.keyframe_slots());
-  for (const KeyframeId id : theirs_kept) {
-    Keyframe keyframe = *other.find(id);
+  std::vector<KeyframeId> id_of(other.keyframes.empty() ? 0 : other.keyframes.back().id.index() + 1);
+  for (Keyframe keyframe : other.keyframes) {
+    const std::size_t theirs = keyframe.id.index();
     keyframe.submap = submap_of.at(keyframe.submap);
     keyframe.session = session_of.at(keyframe.session);
-    id_of[id.index()] = insert(std::move(keyframe));
+    id_of[theirs] = insert(std::move(keyframe));
   }
-  for (const LandmarkId id : other.landmark_ids()) {
-    Landmark landmark = *other.find(id);
-    if (without.count(other.submap_of(landmark)) > 0) continue;
-    for (auto& observation : landmark.observations)
-      observation.keyframe = id_of[observation.keyframe.index()];
-    landmark.created_by = id_of[other.T_camera_anchor(landmark.created_by).first.index()];
+  const auto ours = [&](KeyframeId id) {
+    return id.index() < id_of.size() ? id_of[id.index()] : KeyframeId{};
+  };
+  for (Landmark landmark : other.landmarks) {
+    for (auto& observation : landmark.observations) observation.keyframe = ours(observation.keyframe);
+    std::erase_if(landmark.observations, [&](const Observation& o) {
+      return !o.keyframe.is_valid() || find(o.keyframe)->landmarks[o.point].is_valid();
+    });
+    if (landmark.observations.empty()) continue;
+    landmark.created_by = ours(landmark.created_by);
+    if (!landmark.created_by.is_valid()) landmark.created_by = landmark.observations.front().keyframe;
     insert(std::move(landmark));
   }
-  for (const auto& loop : other.loops()) {
-    if (!id_of[loop.from.index()].is_valid() || !id_of[loop.to.index()].is_valid()) continue;
-    add_loop(id_of[loop.from.index()], id_of[loop.to.index()], loop.T_to_from);
+  for (const auto& loop : other.loops) {
+    if (ours(loop.from).is_valid() && ours(loop.to).is_valid())
+      add_loop(ours(loop.from), ours(loop.to), loop.T_to_from);
   }
 }
 
@@ -97,6 +99,19 @@ std::vector<SubmapId> Map::submaps() const {
     if (keyframe) result.insert(keyframe->submap);
   }
   return {result.begin(), result.end()};
+}
+
+void Map::transform(SubmapId submap, const SE3& T_new_old) {
+  const SE3 T_old_new = T_new_old.inverse();
+  for (const auto& landmark : landmarks_) {
+    if (!landmark || submap_of(*landmark) != submap) continue;
+    landmark->position = T_new_old * landmark->position;
+    landmark->normal = T_new_old.rotation() * landmark->normal;
+  }
+  for (const auto& keyframe : keyframes_) {
+    if (keyframe && keyframe->submap == submap)
+      keyframe->T_camera_world = keyframe->T_camera_world * T_old_new;
+  }
 }
 
 void Map::merge_submaps(SubmapId from, SubmapId into) {

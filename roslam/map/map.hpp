@@ -18,6 +18,8 @@
 
 namespace roslam {
 
+struct MapParts;
+
 /// A frame kept in the map.
 struct ROSLAM_EXPORT Keyframe {
   KeyframeId id;
@@ -82,9 +84,9 @@ class ROSLAM_EXPORT Map {
   /// id, and of points that observe no other landmark.
   LandmarkId insert(Landmark landmark);
 
-  /// Inserts all elements of another map, with new ids without gaps, as separate submaps and sessions.
-  /// without: submaps of the other that are left out.
-  void append(const Map& other, const std::set<SubmapId>& without = {});
+  /// Inserts all elements of another map, with new ids without gaps, as separate submaps and sessions. Leaves
+  /// out what refers to elements that are not among them.
+  void append(const MapParts& other);
 
   /// Adds an observation. Does nothing and returns false if the point observes another landmark, or if the
   /// keyframe observes this landmark already.
@@ -136,6 +138,9 @@ class ROSLAM_EXPORT Map {
 
   /// Poses of a session's existing keyframes in a submap, in order of creation.
   Trajectory trajectory(std::uint32_t session, SubmapId submap) const;
+
+  /// Moves all of a submap into another world frame.
+  void transform(SubmapId submap, const SE3& T_new_old);
 
   /// Merges two submaps whose poses are already aligned.
   void merge_submaps(SubmapId from, SubmapId into);

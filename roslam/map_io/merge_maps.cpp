@@ -6,6 +6,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/map/map_mutex.hpp"
+#include "roslam/map/map_parts.hpp"
 
 namespace roslam {
 
@@ -50,9 +51,9 @@ SavedMap merge_maps(const SavedMap& first, const SavedMap& second,
   KeyframeDatabase database(std::move(vocabulary));
   first.index(database);
   Map map({first.map.scales().begin(), first.map.scales().end()});
-  map.append(first.map);
+  map.append(MapParts::of(first.map));
   const auto begin = static_cast<std::uint32_t>(map.keyframe_slots());
-  map.append(second.map);
+  map.append(MapParts::of(second.map));
 
   // Global bundle adjustment once, after all loops.
   const int bundle_iterations = std::exchange(settings.closer.bundle_iterations, 0);

@@ -6,6 +6,8 @@
 #include <sstream>
 
 #include "roslam/common/error.hpp"
+#include "roslam/map/map_mutex.hpp"
+#include "roslam/map/map_parts.hpp"
 #include "roslam/place_recognition/keyframe_database.hpp"
 
 namespace roslam {
@@ -30,12 +32,18 @@ std::string in_words(const Camera& camera) {
 }
 }  // namespace
 
-SavedMap SavedMap::of(const Camera& camera, const Map& map, const KeyframeDatabase* database,
+SavedMap SavedMap::of(const Camera& camera, const Map& map, const KeyframeDatabase* database) {
+  MapMutex mutex;
+  return of(camera, map, database, mutex, {});
+}
+
+SavedMap SavedMap::of(const Camera& camera, const Map& map, const KeyframeDatabase* database, MapMutex& mutex,
                       const std::set<SubmapId>& without) {
+  const MapParts parts = MapParts::of(map, mutex, without);
   SavedMap saved;
   saved.camera = camera;
-  saved.map = Map({map.scales().begin(), map.scales().end()});
-  saved.map.append(map, without);
+  saved.map = Map(parts.scales);
+  saved.map.append(parts);
   // Landmarks that bundle adjustment moved out of range are useless, and load_map would refuse them.
   for (const LandmarkId id : saved.map.landmark_ids()) {
     const Eigen::Vector3d& position = saved.map.find(id)->position;
@@ -43,10 +51,13 @@ SavedMap SavedMap::of(const Camera& camera, const Map& map, const KeyframeDataba
   }
   if (database == nullptr) return saved;
   saved.vocabulary = database->vocabulary().fingerprint();
-  for (const KeyframeId id : map.keyframe_ids()) {
-    if (without.count(map.find(id)->submap) > 0) continue;
-    const BagOfWords* bag = database->find(id);
-    saved.words.push_back(bag != nullptr ? *bag : BagOfWords{});
+  constexpr std::size_t kPerLock = 100;  // keyframes
+  for (std::size_t begin = 0; begin < parts.keyframes.size(); begin += kPerLock) {
+    const MapLock lock(mutex, "copy of the map");
+    for (std::size_t i = begin; i < std::min(begin + kPerLock, parts.keyframes.size()); ++i) {
+      const BagOfWords* bag = database->find(parts.keyframes[i].id);
+      saved.words.push_back(bag != nullptr ? *bag : BagOfWords{});
+    }
   }
   return saved;
 }

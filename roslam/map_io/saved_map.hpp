@@ -16,6 +16,7 @@
 namespace roslam {
 
 class KeyframeDatabase;
+class MapMutex;
 
 /// A map as stored between sessions, with what another session needs to continue it.
 struct ROSLAM_EXPORT SavedMap {
@@ -25,10 +26,13 @@ struct ROSLAM_EXPORT SavedMap {
   std::uint64_t vocabulary = 0;   ///< fingerprint of the vocabulary of the words, 0: there are no words
   std::vector<BagOfWords> words;  ///< by keyframe id, may be fewer
 
-  /// A copy of all existing elements, with ids without gaps. database: source of the words, may be null.
-  /// without: submaps that are left out.
-  static SavedMap of(const Camera& camera, const Map& map, const KeyframeDatabase* database,
-                     const std::set<SubmapId>& without = {});
+  /// A copy of all existing elements of a map that nobody else uses, with ids without gaps. database: source
+  /// of the words, may be null.
+  static SavedMap of(const Camera& camera, const Map& map, const KeyframeDatabase* database);
+
+  /// Of a map and a database that others change, as MapParts. without: submaps that are left out.
+  static SavedMap of(const Camera& camera, const Map& map, const KeyframeDatabase* database, MapMutex& mutex,
+                     const std::set<SubmapId>& without);
 
   /// Throws InputError if the map was made with another camera or with other pyramid levels, so that its
   /// frames cannot be matched with it.

@@ -99,22 +99,39 @@ void FusionOptions::validate() const {
   if (second_neighbours < 0) throw OptionsError("fusion.second_neighbours must not be negative");
 }
 
-int fuse_landmarks(Map& map, KeyframeId id, const Camera& camera, const MeasurementNoise& noise,
-                   const MatcherOptions& matcher, const FusionOptions& options) {
+int fuse_landmarks(Map& map, MapMutex& mutex, KeyframeId id, const Camera& camera,
+                   const MeasurementNoise& noise, const MatcherOptions& matcher,
+                   const FusionOptions& options) {
+  constexpr const char* kPurpose = "fusion of landmarks";
+  constexpr std::size_t kPerLock = 1000;  // landmarks
   Fuser fuser(map, camera, noise, matcher);
-  const auto neighbours = neighbourhood(map, id, options);
+  std::vector<KeyframeId> neighbours;
+  {
+    const MapLock lock(mutex, kPurpose);
+    neighbours = neighbourhood(map, id, options);
+  }
   int merged = 0;
   for (const KeyframeId neighbour : neighbours) {
+    const MapLock lock(mutex, kPurpose);
+    if (map.find(neighbour) == nullptr || map.find(id) == nullptr) continue;
     merged += fuser.fuse_into(neighbour, landmarks_of(*map.find(id)));
   }
   std::vector<LandmarkId> theirs;
   for (const KeyframeId neighbour : neighbours) {
+    const MapLock lock(mutex, kPurpose);
+    if (map.find(neighbour) == nullptr) continue;
     const auto landmarks = landmarks_of(*map.find(neighbour));
     theirs.insert(theirs.end(), landmarks.begin(), landmarks.end());
   }
   std::sort(theirs.begin(), theirs.end());
   theirs.erase(std::unique(theirs.begin(), theirs.end()), theirs.end());
-  merged += fuser.fuse_into(id, theirs);
+  for (std::size_t begin = 0; begin < theirs.size(); begin += kPerLock) {
+    const MapLock lock(mutex, kPurpose);
+    if (map.find(id) == nullptr) break;
+    const auto first = theirs.begin() + static_cast<std::ptrdiff_t>(begin);
+    const auto last = theirs.begin() + static_cast<std::ptrdiff_t>(std::min(begin + kPerLock, theirs.size()));
+    merged += fuser.fuse_into(id, {first, last});
+  }
   return merged;
 }
 

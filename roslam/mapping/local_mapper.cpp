@@ -39,28 +39,26 @@ void LocalMapper::process(KeyframeId keyframe, const std::function<bool()>& shou
   times_ = {};
   {
     const Stopwatch watch;
-    const std::scoped_lock lock(map_mutex_);
+    const MapLock lock(map_mutex_, "culling of landmarks");
     landmark_culler_.cull(map_, keyframe);
     times_.culling += watch.seconds();
   }
   {
     const Stopwatch watch;
-    const std::scoped_lock lock(map_mutex_);
-    landmark_culler_.watch(landmarks_from_triangulation(map_, keyframe, camera_, settings_.noise,
+    landmark_culler_.watch(landmarks_from_triangulation(map_, map_mutex_, keyframe, camera_, settings_.noise,
                                                         settings_.matcher, settings_.landmarks));
     times_.landmarks += watch.seconds();
   }
   {
     const Stopwatch watch;
-    const std::scoped_lock lock(map_mutex_);
-    fuse_landmarks(map_, keyframe, camera_, settings_.noise, settings_.matcher, settings_.fusion);
+    fuse_landmarks(map_, map_mutex_, keyframe, camera_, settings_.noise, settings_.matcher, settings_.fusion);
     times_.fusion += watch.seconds();
   }
   const Stopwatch watch;
   adjust_around(keyframe, should_stop);
   times_.bundle += watch.seconds();
   const Stopwatch culling_watch;
-  const std::scoped_lock lock(map_mutex_);
+  const MapLock lock(map_mutex_, "culling of keyframes");
   cull_keyframes(map_, keyframe, settings_.culling);
   times_.culling += culling_watch.seconds();
 }
@@ -69,14 +67,14 @@ void LocalMapper::adjust_around(KeyframeId keyframe, const std::function<bool()>
   LocalBundle local;
   std::size_t corrections = 0;
   {
-    const std::scoped_lock lock(map_mutex_);
+    const MapLock lock(map_mutex_, "reading for bundle adjustment");
     corrections = map_.corrections();
     if (map_.keyframe_count() < 2) return;
     local = LocalBundle::around(map_, keyframe, settings_.noise, settings_.bundle);
   }
   const BundleSummary summary = adjust_bundle(camera_, local.problem, settings_.bundle, should_stop);
   if (!summary.is_usable) return;
-  const std::scoped_lock lock(map_mutex_);
+  const MapLock lock(map_mutex_, "result of bundle adjustment");
   if (map_.corrections() != corrections) return;  // a loop closure moved the map meanwhile
   local.apply_to(map_, camera_);
 }

@@ -77,22 +77,42 @@ std::optional<Eigen::Vector3d> triangulate(const Eigen::Vector3d& origin_a,
   return 0.5 * (origin_a + along_a * a + origin_b + along_b * b);
 }
 
-std::vector<LandmarkId> landmarks_from_triangulation(Map& map, KeyframeId id, const Camera& camera,
-                                                     const MeasurementNoise& noise,
+std::vector<LandmarkId> landmarks_from_triangulation(Map& map, MapMutex& mutex, KeyframeId id,
+                                                     const Camera& camera, const MeasurementNoise& noise,
                                                      const MatcherOptions& matcher,
                                                      const NewLandmarkOptions& options) {
+  constexpr const char* kPurpose = "new landmarks";
+  std::vector<KeyframeId> neighbours;
+  {
+    const MapLock lock(mutex, kPurpose);
+    for (const auto& [neighbour, shared] : map.covisible(id, options.min_shared)) {
+      if (static_cast<int>(neighbours.size()) < options.neighbours) neighbours.push_back(neighbour);
+    }
+  }
   std::vector<LandmarkId> created;
-  const Keyframe& keyframe = *map.find(id);
-  int searched = 0;
-  for (const auto& [neighbour_id, shared] : map.covisible(id, options.min_shared)) {
-    if (searched++ >= options.neighbours) break;
-    const Keyframe& neighbour = *map.find(neighbour_id);
-    const auto free = free_points(keyframe);
+  for (const KeyframeId neighbour_id : neighbours) {
+    std::vector<std::uint32_t> free;
+    std::shared_ptr<const ObservedFrame> view, other;
+    {
+      const MapLock lock(mutex, kPurpose);
+      const Keyframe* keyframe = map.find(id);
+      const Keyframe* neighbour = map.find(neighbour_id);
+      if (keyframe == nullptr || neighbour == nullptr) continue;
+      free = free_points(*keyframe);
+      view = keyframe->view;
+      other = neighbour->view;
+    }
     if (free.empty()) break;
-    for (const auto& [ours, theirs] : match_descriptors(*keyframe.view, free, *neighbour.view, matcher)) {
+    const auto matches = match_descriptors(*view, free, *other, matcher);
+    const MapLock lock(mutex, kPurpose);
+    if (map.find(id) == nullptr || map.find(neighbour_id) == nullptr) continue;
+    const Keyframe& keyframe = *map.find(id);
+    const Keyframe& neighbour = *map.find(neighbour_id);
+    for (const auto& [ours, theirs] : matches) {
       const auto position =
           triangulate_points(keyframe, ours, neighbour, theirs, camera, options.min_parallax);
-      if (!position || neighbour.landmarks[theirs].is_valid() || neighbour.view->may_move(theirs)) continue;
+      const bool is_free = !keyframe.landmarks[ours].is_valid() && !neighbour.landmarks[theirs].is_valid();
+      if (!position || !is_free || neighbour.view->may_move(theirs)) continue;
       if (!is_within_outlier_limit(map, keyframe, ours, *position, camera, noise) ||
           !is_within_outlier_limit(map, neighbour, theirs, *position, camera, noise)) {
         continue;

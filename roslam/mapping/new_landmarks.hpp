@@ -6,6 +6,7 @@
 #include "roslam/estimation/measurement_model.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/map/map.hpp"
+#include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/mapping_options.hpp"
 #include "roslam/matching/projection_matcher.hpp"
 
@@ -17,9 +18,10 @@ std::vector<LandmarkId> landmarks_from_depth(Map& map, KeyframeId keyframe, cons
                                              const NewLandmarkOptions& options);
 
 /// Triangulates landmarks from points that match in a covisible keyframe, given enough parallax; for points
-/// without usable depth.
-std::vector<LandmarkId> landmarks_from_triangulation(Map& map, KeyframeId keyframe, const Camera& camera,
-                                                     const MeasurementNoise& noise,
+/// without usable depth. The map's mutex is held for a neighbour at a time, and not while descriptors are
+/// compared.
+std::vector<LandmarkId> landmarks_from_triangulation(Map& map, MapMutex& mutex, KeyframeId keyframe,
+                                                     const Camera& camera, const MeasurementNoise& noise,
                                                      const MatcherOptions& matcher,
                                                      const NewLandmarkOptions& options);
 

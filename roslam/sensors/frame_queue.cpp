@@ -45,6 +45,7 @@ std::optional<Frame> FrameQueue::pop() {
   if (queue_.size() > relaxed_ && !closed_) {
     drop_front(queue_, queue_[1].frame);
   }
+  while (policy_ == Policy::kNewest && queue_.size() > 1) drop_front(queue_, queue_[1].frame);
   Waiting next = std::move(queue_.front());
   queue_.pop_front();
   longest_gap_ = std::max(longest_gap_, next.number - expected_);

@@ -13,11 +13,15 @@ namespace roslam {
 
 /// Frames between a camera and a tracker that may be slower. What is dropped is spread over time, as a gap of
 /// many frames costs the tracker more than many gaps of one: while more frames wait than should, each pop()
-/// passes over one; if there is no room at all, every second frame that waits is dropped.
+/// passes over one; if there is no room at all, every second frame that waits is dropped. Where the latency
+/// matters more, as with a camera, the newest frame is taken and all others are dropped.
 class FrameQueue {
  public:
+  enum class Policy { kSpreadDrops, kNewest };
+
   /// relaxed: frames that may wait without any being dropped; four times as many have room.
-  explicit FrameQueue(std::size_t relaxed) : relaxed_(relaxed), room_(4 * relaxed) {}
+  explicit FrameQueue(std::size_t relaxed, Policy policy = Policy::kSpreadDrops)
+      : relaxed_(relaxed), room_(4 * relaxed), policy_(policy) {}
 
   /// Never waits.
   void push(Frame frame);
@@ -46,6 +50,7 @@ class FrameQueue {
 
   std::size_t relaxed_;
   std::size_t room_;
+  Policy policy_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Waiting> queue_;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <map>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -19,10 +21,11 @@ namespace roslam {
 struct ROSLAM_EXPORT Frame {
   std::size_t index = 0;   ///< position in the source, counted from 0; skipped frames leave gaps
   double timestamp = 0.0;  ///< seconds, as given by the source
-  int segment = 0;         ///< restarts of the source's clock before this frame, as far as the source knows
-  cv::Mat colour;          ///< CV_8UC3, BGR, raw (distorted)
-  cv::Mat depth;           ///< CV_32FC1, metres along the optical axis, 0 = unknown; registered to colour
-  cv::Mat labels;          ///< CV_8UC1 class of each pixel if the source knows it, else empty
+  std::optional<std::chrono::steady_clock::time_point> received;  ///< when it reached this computer, if known
+  int segment = 0;  ///< restarts of the source's clock before this frame, as far as the source knows
+  cv::Mat colour;   ///< CV_8UC3, BGR, raw (distorted)
+  cv::Mat depth;    ///< CV_32FC1, metres along the optical axis, 0 = unknown; registered to colour
+  cv::Mat labels;   ///< CV_8UC1 class of each pixel if the source knows it, else empty
   std::vector<InertialSample>
       inertial;  ///< since the frame before, in order of time; Camera::imu says how fixed
   std::optional<SE3> T_world_camera;  ///< ground truth if the source has it; never used for tracking
@@ -40,8 +43,18 @@ class ROSLAM_EXPORT FrameSource {
   /// The next frame, or nothing at the end. Timestamps strictly increase, unless the clock restarts.
   virtual std::optional<Frame> next() = 0;
 
-  /// Makes a waiting next() return nothing soon, such as when a camera has stalled. Safe from any thread.
+  /// Makes a waiting next() return nothing within 200 ms, such as when a camera has stalled. Safe from any
+  /// thread.
   virtual void interrupt() {}
+
+  /// The next frame, or nothing at the end or soon after a stop was requested.
+  std::optional<Frame> next(const std::stop_token& stop) {
+    const std::stop_callback on_stop(stop, [this] { interrupt(); });
+    return stop.stop_requested() ? std::nullopt : next();
+  }
+
+  /// True for a camera: frames come at its own pace and are lost if nobody takes them.
+  virtual bool is_live() const { return false; }
 
   virtual const Camera& camera() const = 0;
 

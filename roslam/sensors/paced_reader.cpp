@@ -11,7 +11,9 @@ using Clock = std::chrono::steady_clock;
 }
 
 PacedReader::PacedReader(FrameSource& source, std::size_t queue_size)
-    : source_(source), queue_(queue_size), thread_([this](const std::stop_token& stop) { read(stop); }) {}
+    : source_(source),
+      queue_(queue_size, source.is_live() ? FrameQueue::Policy::kNewest : FrameQueue::Policy::kSpreadDrops),
+      thread_([this](const std::stop_token& stop) { read(stop); }) {}
 
 std::optional<Frame> PacedReader::next() {
   auto frame = queue_.pop();
@@ -30,14 +32,20 @@ void PacedReader::read(const std::stop_token& stop) {
     auto due = Clock::now();
     std::optional<double> last_timestamp;
     while (!stop.stop_requested()) {
-      auto frame = source_.next();
+      auto frame = source_.next(stop);
       if (!frame) break;
+      if (source_.is_live()) {
+        if (!frame->received) frame->received = Clock::now();
+        queue_.push(std::move(*frame));
+        continue;
+      }
       // The clock starts when the first frame is there, however long the source took to open.
       due = last_timestamp ? due + pause(*last_timestamp, frame->timestamp) : Clock::now();
       if (std::isfinite(frame->timestamp)) last_timestamp = frame->timestamp;
       std::unique_lock lock(mutex_);
       tick_.wait_until(lock, stop, due, [] { return false; });
       if (stop.stop_requested()) break;
+      frame->received = Clock::now();
       queue_.push(std::move(*frame));
     }
   } catch (...) {

@@ -14,8 +14,9 @@
 
 namespace roslam {
 
-/// Reads a recorded source on a thread of its own and hands out frames at the pace of their timestamps, as a
-/// camera would. Frames that nobody takes in time are dropped and counted (FrameQueue).
+/// Reads a source on a thread of its own. Frames of a recorded one are handed out at the pace of their
+/// timestamps, as a camera would; those of a camera as they come, as its clock may be faster or slower than
+/// this computer's. Frames that nobody takes in time are dropped and counted (FrameQueue).
 class PacedReader {
  public:
   /// source must outlive the reader and is used by nobody else meanwhile. queue_size: frames that may wait

@@ -36,6 +36,26 @@ std::string_view describe(RejectReason reason) {
   return "unknown";
 }
 
+std::string_view describe(NoPose reason) {
+  switch (reason) {
+    case NoPose::kNone:
+      return "pose known";
+    case NoPose::kNoMap:
+      return "no map yet: too few points of known depth, or movable objects fill the image";
+    case NoPose::kNotRecognised:
+      return "the map does not show what the image shows";
+    case NoPose::kFewLandmarks:
+      return "too few landmarks agree";
+    case NoPose::kUncertain:
+      return "what is in view does not constrain the pose";
+    case NoPose::kPoorFit:
+      return "matches are off by much, as in a blurred image";
+    case NoPose::kImplausible:
+      return "the motion is not plausible";
+  }
+  return "unknown";
+}
+
 FrameGate::Verdict FrameGate::check(const Frame& frame, const cv::Mat& mask) {
   if (const RejectReason reason = check_images(frame, mask); reason != RejectReason::kNone) return {reason};
   if (!std::isfinite(frame.timestamp)) return {RejectReason::kTimeNotFinite};

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "roslam/common/stopwatch.hpp"
-#include "roslam/slam/settings.hpp"
+#include "roslam/options/settings.hpp"
 
 namespace roslam {
 
@@ -97,7 +97,7 @@ void FrontEnd::extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& m
   // motion now serves the pose.
   const bool is_scarce = frame_count > 0 && last_inliers_ < options_.dynamic_objects.scarce_points;
   const cv::Mat resting = is_scarce ? objects.resting : cv::Mat();
-  cv::Mat still = options_.dynamic_objects.resting_weight > 0.0 ? objects.still : cv::Mat();
+  cv::Mat still = objects.still;
   cv::Mat forbidden = objects.mask;
   if (!resting.empty()) forbidden = forbidden & ~resting;
   if (!mask.empty()) {

@@ -19,9 +19,9 @@
 #include "roslam/sensors/depth_check.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/slam/camera_noise.hpp"
-#include "roslam/slam/load_control.hpp"
-#include "roslam/slam/segmentation_worker.hpp"
 #include "roslam/tracking/tracker.hpp"
+#include "roslam/workers/load_control.hpp"
+#include "roslam/workers/segmentation_worker.hpp"
 
 namespace roslam {
 

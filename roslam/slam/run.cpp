@@ -22,11 +22,12 @@ class Runner {
 
   void follow(FrameSource& source, const std::stop_token& stop) {
     while (!stop.stop_requested()) {
-      const auto frame = source.next();
-      if (!frame) return;
+      auto frame = source.next(stop);
+      if (!frame) break;
+      if (!frame->received) frame->received = Clock::now();
       process(*frame);
     }
-    summary_.interrupted = true;
+    summary_.interrupted = stop.stop_requested();
   }
 
   void follow_in_real_time(FrameSource& source, const std::stop_token& stop) {

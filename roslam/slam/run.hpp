@@ -26,10 +26,10 @@ struct ROSLAM_EXPORT RunSummary {
 
 /// Feeds a source through the pipeline until it ends or a stop is requested, then calls Slam::finish(). A
 /// stop also cancels (Slam::cancel()), so that this returns soon. In real-time mode frames come at the pace
-/// of their timestamps on a thread of their own, and those the tracker has no time for are dropped; a gap in
-/// the timestamps is waited for no longer than a second. on_frame is called on the calling thread after each
-/// frame that was used. An exception of the source or the pipeline ends the run and is kept in the summary,
-/// so that results can still be written.
+/// of their timestamps on a thread of their own, those of a camera as they come, and those the tracker has no
+/// time for are dropped; a gap in the timestamps is waited for no longer than a second. on_frame is called on
+/// the calling thread after each frame that was used. An exception of the source or the pipeline ends the run
+/// and is kept in the summary, so that results can still be written.
 ROSLAM_EXPORT RunSummary run_slam(FrameSource& source, Slam& slam,
                                   const std::function<void(const Frame&, const FrameResult&)>& on_frame = {},
                                   const std::stop_token& stop = {});

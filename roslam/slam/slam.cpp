@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/slam/slam.hpp"
 
-#include <mutex>
 #include <utility>
 
-#include "roslam/slam/settings.hpp"
+#include "roslam/common/error.hpp"
+#include "roslam/options/settings.hpp"
 #include "roslam/slam/slam_impl.hpp"
 
 namespace roslam {
+
+namespace {
+constexpr const char* kReading = "reading of results";
+}
 
 Slam::Slam(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,
            std::shared_ptr<const Vocabulary> vocabulary)
@@ -23,6 +27,12 @@ void Slam::load_map(SavedMap saved) {
   impl_->map = std::move(saved.map);
   impl_->map.begin_session();
   impl_->poses.publish(impl_->map);
+}
+
+void Slam::set_initial_pose(const SE3& T_world_body) {
+  if (!T_world_body.is_finite()) throw UsageError("set_initial_pose: the pose is not finite");
+  if (impl_->log.frames() > 0) throw UsageError("set_initial_pose: call it before the first frame");
+  impl_->level.set_initial_pose(T_world_body);
 }
 
 void Slam::enable_dense_mapping() {
@@ -48,51 +58,59 @@ void Slam::enable_restoration(std::shared_ptr<Inpainter> inpainter, OnRestored o
       [hand_to_dense](KeyframeId keyframe) { hand_to_dense(keyframe, nullptr); }, &impl.load);
 }
 
-FrameResult Slam::process(const Frame& frame, const cv::Mat& mask) { return impl_->process(frame, mask); }
+void Slam::on_frame(OnFrame callback) { impl_->on_frame = std::move(callback); }
 
-void Slam::finish() { impl_->finish(); }
+void Slam::on_map_changed(OnMapChanged callback) { impl_->on_map_changed = std::move(callback); }
+
+FrameResult Slam::process(const Frame& frame, const cv::Mat& mask) {
+  if (impl_->callbacks.is_inside()) throw UsageError("Slam::process must not be called by a callback");
+  return impl_->process(frame, mask);
+}
+
+void Slam::finish() {
+  if (impl_->callbacks.is_inside()) throw UsageError("Slam::finish must not be called by a callback");
+  impl_->finish();
+}
 
 void Slam::cancel() { impl_->cancel(); }
 
-Trajectory Slam::trajectory() const {
-  const std::scoped_lock lock(impl_->map_mutex);
-  return impl_->log.trajectory(impl_->map, impl_->log.main_submap(impl_->map));
-}
+Trajectory Slam::trajectory() const { return impl_->live.trajectory(); }
 
 Trajectory Slam::keyframes() const {
-  const std::scoped_lock lock(impl_->map_mutex);
+  const MapLock lock(impl_->map_mutex, kReading);
   return impl_->map.trajectory(impl_->map.session(), impl_->log.main_submap(impl_->map));
 }
 
 SubmapId Slam::main_submap() const {
-  const std::scoped_lock lock(impl_->map_mutex);
+  const MapLock lock(impl_->map_mutex, kReading);
   return impl_->log.main_submap(impl_->map);
 }
 
 bool Slam::found_in_loaded_map() const {
-  const std::scoped_lock lock(impl_->map_mutex);
+  const MapLock lock(impl_->map_mutex, kReading);
   return impl_->log.found_in_loaded_map(impl_->map);
 }
 
 std::map<SubmapId, std::size_t> Slam::frames_in_other_submaps() const {
-  const std::scoped_lock lock(impl_->map_mutex);
+  const MapLock lock(impl_->map_mutex, kReading);
   auto frames = impl_->log.frames_by_submap(impl_->map);
   frames.erase(impl_->log.main_submap(impl_->map));
   return frames;
 }
 
 std::set<SubmapId> Slam::submaps_on_objects() const {
-  const std::scoped_lock lock(impl_->map_mutex);
+  const MapLock lock(impl_->map_mutex, kReading);
   return impl_->log.submaps_on_objects(impl_->map);
 }
 
 const Map& Slam::map() const { return impl_->map; }
 
-SavedMap Slam::snapshot() const {
-  const std::scoped_lock lock(impl_->map_mutex);
+std::shared_ptr<const MapSnapshot> Slam::snapshot() const { return impl_->live.snapshot(); }
+
+SavedMap Slam::saved_map() const {
   return SavedMap::of(impl_->camera, impl_->map,
-                      impl_->keyframe_database ? &*impl_->keyframe_database : nullptr,
-                      impl_->log.submaps_on_objects(impl_->map));
+                      impl_->keyframe_database ? &*impl_->keyframe_database : nullptr, impl_->map_mutex,
+                      submaps_on_objects());
 }
 
 std::optional<DenseMap> Slam::dense_map(const std::stop_token& stop) const {
@@ -101,12 +119,12 @@ std::optional<DenseMap> Slam::dense_map(const std::stop_token& stop) const {
 }
 
 std::vector<ClosedLoop> Slam::loops() const {
-  const std::scoped_lock lock(impl_->map_mutex);
+  const MapLock lock(impl_->map_mutex, kReading);
   return impl_->loop_closer ? impl_->loop_closer->closed() : std::vector<ClosedLoop>{};
 }
 
 std::size_t Slam::refused_loops() const {
-  const std::scoped_lock lock(impl_->map_mutex);
+  const MapLock lock(impl_->map_mutex, kReading);
   return impl_->loop_closer ? impl_->loop_closer->refused() : 0;
 }
 
@@ -165,5 +183,10 @@ StageTimes Slam::times() const {
   if (impl_->dense) all.add_all(impl_->dense->times());
   return all;
 }
+
+const StageTimes& Slam::latency() const { return impl_->latency; }
+MapLockTimes Slam::lock_times() const { return impl_->map_mutex.times(); }
+std::size_t Slam::dropped_callbacks() const { return impl_->callbacks.dropped(); }
+std::map<std::string, std::size_t> Slam::callback_faults() const { return impl_->callbacks.faults(); }
 
 }  // namespace roslam

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -17,20 +18,33 @@
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/loop_closing/closed_loop.hpp"
+#include "roslam/map/map_mutex.hpp"
 #include "roslam/map_io/saved_map.hpp"
 #include "roslam/options/options.hpp"
 #include "roslam/restoration/inpainter.hpp"
 #include "roslam/semantics/segmenter.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/slam/frame_result.hpp"
-#include "roslam/slam/restored_keyframe.hpp"
+#include "roslam/slam/map_snapshot.hpp"
+#include "roslam/workers/restored_keyframe.hpp"
 
 namespace roslam {
 
+/// Takes the result of each frame; a copy of the map's changes after each keyframe, loop and the like.
+using OnFrame = std::function<void(const FrameResult&)>;
+using OnMapChanged = std::function<void(const MapChange&)>;
+
 /// The pipeline: frames in, trajectory and map out. open_slam() makes one with all its parts.
 ///
-/// Threads: process(), finish() and all functions that give results are called from one thread, results other
-/// than counts only after finish() in real-time mode. cancel() may be called from any thread.
+/// Threads: process(), finish() and what configures are called from one thread. snapshot(), saved_map(),
+/// trajectory(), keyframes(), main_submap() and the other functions of submaps, loops(), lock_times() and
+/// cancel() may be called from any thread at any time, and hold the map for a millisecond or two at a time.
+/// All others give results of the thread that calls process(), map() and dense_map() only after finish() in
+/// real-time mode.
+///
+/// Callbacks are called on a thread of their own in real-time mode, and so cost the tracker nothing, however
+/// long they take: of more than 64 that wait the oldest are dropped and counted. In deterministic mode they
+/// are called by process(). They may call what may be called from any thread. What they throw is counted.
 class ROSLAM_EXPORT Slam {
  public:
   /// segmenter: labels frames on a thread of its own, null: none. vocabulary: for place recognition, null:
@@ -47,6 +61,15 @@ class ROSLAM_EXPORT Slam {
   /// Continues the map of an earlier session: the camera is localised in it. Call before the first frame.
   /// Throws InputError if the map was made with another camera or other pyramid levels.
   void load_map(SavedMap saved);
+
+  /// The pose of the body at the first frame, in place of a level one in the origin. The world is that of
+  /// this pose, and gravity does not turn it. Call before the first frame. Throws UsageError if it is not
+  /// finite, or later.
+  void set_initial_pose(const SE3& T_world_body);
+
+  /// on_frame: takes each frame's result. on_map_changed: takes what changed. Call before the first frame.
+  void on_frame(OnFrame callback);
+  void on_map_changed(OnMapChanged callback);
 
   /// Fuses keyframes into a dense map from now on, in real-time mode on another thread; restored keyframes,
   /// if enable_restoration() is called as well. Call before the first frame. Throws OptionsError in a library
@@ -92,13 +115,16 @@ class ROSLAM_EXPORT Slam {
   /// Frames tracked in each submap other than the main one.
   std::map<SubmapId, std::size_t> frames_in_other_submaps() const;
 
-  /// Submaps, other than the main one, that were mapped on dynamic objects; snapshot() leaves them out.
+  /// Submaps, other than the main one, that were mapped on dynamic objects; saved_map() leaves them out.
   std::set<SubmapId> submaps_on_objects() const;
 
   const Map& map() const;
 
+  /// The sparse map and the path as they are now, or were a tenth of a second ago: readers share it.
+  std::shared_ptr<const MapSnapshot> snapshot() const;
+
   /// A copy of the map, for save_map().
-  SavedMap snapshot() const;
+  SavedMap saved_map() const;
 
   /// The dense map of the main submap; nothing if none is made, or if stop was requested before it was
   /// extracted.
@@ -155,6 +181,16 @@ class ROSLAM_EXPORT Slam {
 
   /// Processor time of every stage so far.
   StageTimes times() const;
+
+  /// Wall time of every frame from its receipt to its result: stage "latency".
+  const StageTimes& latency() const;
+
+  /// How long the map was held, by what was done meanwhile, and how long the tracker waited for it at most.
+  MapLockTimes lock_times() const;
+
+  /// Callbacks that were dropped as those before them took too long, and what they threw, by message.
+  std::size_t dropped_callbacks() const;
+  std::map<std::string, std::size_t> callback_faults() const;
 
  private:
   struct Impl;

@@ -3,18 +3,18 @@
 
 #include <chrono>
 #include <exception>
-#include <mutex>
 #include <utility>
 
 #include "roslam/common/stopwatch.hpp"
 #include "roslam/mapping/culling.hpp"
-#include "roslam/slam/settings.hpp"
+#include "roslam/options/settings.hpp"
 
 namespace roslam {
 
 namespace {
 // Keyframes that may wait for global bundle adjustment; while it runs no loop is detected.
 constexpr int kInterruptGlobalBundle = 20;
+constexpr const char* kTracking = "tracking";  // purpose of a lock of the map
 constexpr double kLabelsLast = 1.0;  // seconds that labels are carried to keyframes of the dense map
 
 const Camera& validated(const Camera& camera) {
@@ -34,6 +34,28 @@ Tracker::Settings settings_of_tracker(const Options& options, bool has_vocabular
     settings.tracker.new_submap_after_lost = 0;
   return settings;
 }
+
+NoPose reason_of(const TrackedFrame& frame) {
+  if (frame.T_camera_world) return NoPose::kNone;
+  if (frame.state == TrackingState::kInitialising) return NoPose::kNoMap;
+  switch (frame.doubt) {
+    case PoseDoubt::kNone:
+      return NoPose::kNotRecognised;
+    case PoseDoubt::kFewInliers:
+    case PoseDoubt::kFewFound:
+      return NoPose::kFewLandmarks;
+    case PoseDoubt::kUncertain:
+      return NoPose::kUncertain;
+    case PoseDoubt::kPoorFit:
+      return NoPose::kPoorFit;
+    case PoseDoubt::kSpeed:
+    case PoseDoubt::kAcceleration:
+    case PoseDoubt::kTurnRate:
+    case PoseDoubt::kGyroscope:
+      return NoPose::kImplausible;
+  }
+  return NoPose::kNotRecognised;
+}
 }  // namespace
 
 Slam::Impl::Impl(const Camera& the_camera, const Options& the_options, Mode the_mode,
@@ -46,8 +68,12 @@ Slam::Impl::Impl(const Camera& the_camera, const Options& the_options, Mode the_
       front_end(camera, options, mode, std::move(segmenter), &load),
       map(front_end.level_scales()),
       tracker(camera, map, settings_of_tracker(options, vocabulary != nullptr)),
+      odometry(camera.T_body_camera),
+      level(camera),
       keyframe_policy(options.keyframes),
       mapper(camera, map, map_mutex, mapper_settings(options)),
+      live(map, map_mutex, log),
+      callbacks(mode),
       closing([this](auto&&... work) { close_loops(work...); }, mode, kInterruptGlobalBundle,
               KeyframeWorker::OnFailure::kSwitchOff),
       mapping([this](auto&&... work) { map_keyframe(work...); }, mode, 1) {
@@ -57,8 +83,17 @@ Slam::Impl::Impl(const Camera& the_camera, const Options& the_options, Mode the_
 }
 
 FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
+  FrameResult result = track(frame, mask);
+  result.latency = std::chrono::duration<double>(std::chrono::steady_clock::now() - result.received).count();
+  if (result.is_used()) latency.add("latency", result.latency);
+  if (on_frame) callbacks.post([this, result] { on_frame(result); });
+  return result;
+}
+
+FrameResult Slam::Impl::track(const Frame& frame, const cv::Mat& mask) {
   mapping.check();
   FrameResult result;
+  result.received = frame.received.value_or(std::chrono::steady_clock::now());
   result.index = frame.index;
   result.timestamp = frame.timestamp;
   const auto verdict = gate.check(frame, mask);
@@ -68,6 +103,7 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   result.state = tracker.state();
   if (verdict.is_clock_reset) restart_clock(frame.timestamp);
   tracker.add_inertial(frame.inertial, frame.timestamp);
+  level.add_inertial(frame.inertial);
   if (!result.is_used()) {
     log.add_rejected(result.rejected);
     return result;
@@ -79,12 +115,14 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   result.dynamic_objects = std::move(observation.dynamic_objects);
   result.warnings = std::move(observation.warnings);
 
-  std::unique_lock map_lock(map_mutex);
+  MapLock map_lock(map_mutex, kTracking, true);
+  const bool is_levelled = level_world();
   FrameHint hint{result.dynamic_objects.T_camera_world,
                  observation.hidden_share,
                  frame.depth,
                  observation.rested,
                  observation.may_start,
+                 level.T_camera_start(map.keyframe_count() == 0),
                  [&] { return similar_keyframes(*observation.view); }};
   // A pose in the map as it was before a correction is no hint any more.
   if (front_end.follow_corrections(map, tracker.last_pose())) hint.T_camera_world.reset();
@@ -98,22 +136,15 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   if (tracked.reference.is_valid()) result.submap = map.submap_of(tracked.reference);
   cull_contradicted(tracked, frame, result.dynamic_objects);
   map_lock.unlock();
+  if (is_levelled) publish_poses(MapChangeKind::kLevelled);
+  result.odometry = odometry.add(tracked);
+  level.track(result.odometry);
 
   result.tracking_seconds = watch.seconds();
   load.note_frame(std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count());
   note_times(observation, result.tracking_seconds);
-  result.state = tracked.state;
-  result.inliers = tracked.inliers;
-  result.quality = tracked.quality;
+  fill(result, tracked);
   result.is_keyframe = keyframe.is_valid();
-  if (tracked.T_camera_world) {
-    result.T_world_camera = tracked.T_camera_world->inverse();
-    if (tracked.state == TrackingState::kTracking) {
-      for (const auto& d : unconstrained_directions(tracked.measurement_covariance, options.plausible))
-        result.unconstrained.emplace_back(result.T_world_camera->rotation() * d);
-    }
-    result.covariance = covariance_in_world(*result.T_world_camera, tracked.covariance);
-  }
   result.points = std::move(observation.points);
   result.removed_points = std::move(observation.removed_points);
   check_gyroscope(result);
@@ -122,6 +153,33 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   }
   if (keyframe.is_valid()) submit(keyframe, frame, result.dynamic_objects);
   return result;
+}
+
+// What tracking found.
+void Slam::Impl::fill(FrameResult& result, const TrackedFrame& tracked) const {
+  result.state = tracked.state;
+  result.inliers = tracked.inliers;
+  result.quality = tracked.quality;
+  result.no_pose = reason_of(tracked);
+  if (tracked.T_camera_world) {
+    result.T_world_camera = tracked.T_camera_world->inverse();
+    if (tracked.state == TrackingState::kTracking) {
+      for (const auto& d : unconstrained_directions(tracked.measurement_covariance, options.plausible))
+        result.unconstrained.emplace_back(result.T_world_camera->rotation() * d);
+    }
+    result.covariance = covariance_in_world(*result.T_world_camera, tracked.covariance);
+  }
+}
+
+// Turns the world once gravity is known better, unless its frame was given. Called with the map's mutex held.
+bool Slam::Impl::level_world() {
+  const auto submaps = map.submaps();
+  if (submaps.size() != 1 || map.session() > 0) return false;
+  const auto R_level_world = level.correction();
+  if (!R_level_world) return false;
+  map.transform(submaps.front(), SE3(*R_level_world, Eigen::Vector3d::Zero()));
+  map.note_correction();
+  return true;
 }
 
 // Called with the map's mutex held. Keyframes are not used from now on; they are removed by the thread that
@@ -135,10 +193,12 @@ void Slam::Impl::withdraw(const Withdrawal& wrong, FrameResult& result) {
 
 // Removes a keyframe whose pose was withdrawn. False if it is there and to be mapped.
 bool Slam::Impl::remove_withdrawn(KeyframeId keyframe) {
-  const std::scoped_lock lock(map_mutex);
-  if (!map.is_withdrawn(keyframe)) return map.find(keyframe) == nullptr;
-  map.remove_withdrawn(keyframe);
-  if (needs_poses()) poses.publish(map);
+  {
+    const MapLock lock(map_mutex, "removal of withdrawn keyframes");
+    if (!map.is_withdrawn(keyframe)) return map.find(keyframe) == nullptr;
+    map.remove_withdrawn(keyframe);
+  }
+  publish_poses(MapChangeKind::kWithdrawn);
   return true;
 }
 
@@ -153,12 +213,14 @@ void Slam::Impl::restart_clock(double timestamp) {
   tracker.restart_clock(timestamp);
   keyframe_policy.restart_clock(timestamp);
   front_end.reset();
+  odometry.restart_clock(timestamp);
+  level.restart_clock();
   log.add_clock_reset();
 }
 
 std::optional<SE3> Slam::Impl::predict_pose(double timestamp) {
   if (!front_end.detects()) return std::nullopt;
-  const std::scoped_lock lock(map_mutex);
+  const MapLock lock(map_mutex, kTracking, true);
   front_end.follow_corrections(map, tracker.last_pose());
   return tracker.predicted_pose(timestamp);
 }
@@ -204,7 +266,7 @@ void Slam::Impl::map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldS
                               StageTimes& stage_times) {
   if (remove_withdrawn(keyframe)) return;
   mapper.process(keyframe, should_stop);
-  publish_poses();
+  publish_poses(MapChangeKind::kKeyframe);
   const LocalMapper::Times& t = mapper.times();
   stage_times.add("mapping.landmarks", t.landmarks);
   stage_times.add("mapping.fusion", t.fusion);
@@ -214,10 +276,16 @@ void Slam::Impl::map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldS
   if (loop_closer) closing.submit(keyframe);
 }
 
-void Slam::Impl::publish_poses() {
-  if (!needs_poses()) return;
-  const std::scoped_lock lock(map_mutex);
-  poses.publish(map);
+// Tells restoration, the dense map and the program that keyframes have moved.
+void Slam::Impl::publish_poses(MapChangeKind kind) {
+  if (!needs_poses() && !on_map_changed) return;
+  MapLock lock(map_mutex, "publishing of poses");
+  if (needs_poses()) poses.publish(map);
+  if (!on_map_changed) return;
+  MapChange change = live.change(kind);
+  lock.unlock();
+  if (!change.moved.empty() || !change.removed.empty())
+    callbacks.post([this, change = std::move(change)] { on_map_changed(change); });
 }
 
 void Slam::Impl::close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,
@@ -227,7 +295,7 @@ void Slam::Impl::close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldSt
   const LoopCloser::Times& t = loop_closer->times();
   stage_times.add("loop.recognise", t.recognise);
   if (loop_closer->closed().size() == closed) return;
-  publish_poses();
+  publish_poses(MapChangeKind::kCorrection);
   stage_times.add("loop.correct", t.correct);
   stage_times.add("loop.fuse", t.fuse);
   stage_times.add("loop.bundle_adjustment", t.bundle);
@@ -243,7 +311,7 @@ void Slam::Impl::submit(KeyframeId keyframe, const Frame& frame, const DynamicOb
     if (const auto noise = front_end.noise().depth()) input.depth_noise = options.noise.at_least(*noise);
     input.is_restored = restoration && options.dense.restore && options.dense.remove;
     if (!front_end.labels().empty()) {
-      const std::scoped_lock lock(map_mutex);
+      const MapLock lock(map_mutex, kTracking, true);
       if (const auto T = log.T_frame_keyframe(map, front_end.labelled_index(), keyframe, kLabelsLast)) {
         input.labels = front_end.labels();
         input.has_older_labels = front_end.labelled_index() != frame.index;
@@ -281,6 +349,7 @@ void Slam::Impl::finish() {
   drain(closing);
   if (restoration) drain(*restoration);
   if (dense) drain(*dense);
+  callbacks.drain();
   if (failure) std::rethrow_exception(failure);
 }
 
@@ -291,6 +360,7 @@ void Slam::Impl::cancel() {
   closing.cancel();
   if (restoration) restoration->cancel();
   if (dense) dense->cancel();
+  callbacks.cancel();
 }
 
 }  // namespace roslam

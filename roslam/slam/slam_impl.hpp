@@ -11,17 +11,21 @@
 #include "roslam/map/map.hpp"
 #include "roslam/map/map_mutex.hpp"
 #include "roslam/mapping/local_mapper.hpp"
+#include "roslam/odometry/odometry_estimator.hpp"
+#include "roslam/odometry/world_level.hpp"
 #include "roslam/place_recognition/keyframe_database.hpp"
-#include "roslam/slam/dense_worker.hpp"
 #include "roslam/slam/frame_gate.hpp"
 #include "roslam/slam/front_end.hpp"
-#include "roslam/slam/keyframe_worker.hpp"
-#include "roslam/slam/load_control.hpp"
-#include "roslam/slam/restoration_worker.hpp"
+#include "roslam/slam/live_map.hpp"
 #include "roslam/slam/slam.hpp"
 #include "roslam/slam/trajectory_log.hpp"
 #include "roslam/tracking/keyframe_policy.hpp"
 #include "roslam/tracking/tracker.hpp"
+#include "roslam/workers/callback_queue.hpp"
+#include "roslam/workers/dense_worker.hpp"
+#include "roslam/workers/keyframe_worker.hpp"
+#include "roslam/workers/load_control.hpp"
+#include "roslam/workers/restoration_worker.hpp"
 
 namespace roslam {
 
@@ -36,6 +40,7 @@ struct Slam::Impl {
   ~Impl() { load.release(); }  // or threads that wait would never end
 
   FrameResult process(const Frame& frame, const cv::Mat& mask);
+  FrameResult track(const Frame& frame, const cv::Mat& mask);
   void finish();
   void cancel();
 
@@ -49,8 +54,10 @@ struct Slam::Impl {
   void map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   void close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   bool needs_poses() const { return dense || restoration; }
-  void publish_poses();
+  void publish_poses(MapChangeKind change);
   void submit(KeyframeId keyframe, const Frame& frame, const DynamicObjects& objects);
+  bool level_world();
+  void fill(FrameResult& result, const TrackedFrame& tracked) const;
   void check_gyroscope(FrameResult& result);
   void note_times(const FrontEndResult& observation, double total);
 
@@ -64,14 +71,21 @@ struct Slam::Impl {
   Map map;
   KeyframePoseTable poses;
   Tracker tracker;
+  OdometryEstimator odometry;
+  WorldLevel level;
   KeyframePolicy keyframe_policy;
   LocalMapper mapper;
   std::optional<KeyframeDatabase> keyframe_database;
   std::optional<LoopCloser> loop_closer;
   TrajectoryLog log;
+  LiveMap live;
+  OnFrame on_frame;
+  OnMapChanged on_map_changed;
   StageTimes times;
   bool warned_of_gyroscope = false;
   std::map<std::string, std::string> backends;  // what runs each network
+  StageTimes latency;                           // wall time
+  CallbackQueue callbacks;
   // Last, so that their threads stop before the members they use are destroyed.
   std::optional<DenseWorker> dense;
   std::optional<RestorationWorker> restoration;

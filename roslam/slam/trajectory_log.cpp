@@ -27,6 +27,14 @@ void interpolate_between(Trajectory& trajectory, std::size_t from, std::size_t t
 }
 }  // namespace
 
+// Nothing for a frame that was not tracked.
+TrajectoryLog::OfReference* TrajectoryLog::of_reference(const Record& record) {
+  if (!record.reference.is_valid()) return nullptr;
+  const std::size_t index = record.reference.index();
+  if (index >= of_references_.size()) of_references_.resize(index + 1);
+  return &of_references_[index];
+}
+
 void TrajectoryLog::add(const TrackedFrame& frame, std::size_t index, const Map& map) {
   ++by_state_[frame.state];
   Record record{index, frame.timestamp, {}, {}};
@@ -36,13 +44,23 @@ void TrajectoryLog::add(const TrackedFrame& frame, std::size_t index, const Map&
     record.T_camera_reference = *frame.T_camera_world * map.T_camera_world(frame.reference).inverse();
   }
   records_.push_back(record);
+  if (OfReference* of = of_reference(record)) {
+    ++of->frames;
+    of->measured += record.is_measured() ? 1 : 0;
+  }
 }
 
 std::size_t TrajectoryLog::withdraw_after(double timestamp) {
   std::size_t poses = 0;
   for (std::size_t i = records_.size(); i-- > 1 && records_[i - 1].timestamp > timestamp;) {
     Record& record = records_[i - 1];
-    if (!record.reference.is_valid()) continue;  // it has none
+    OfReference* of = of_reference(record);
+    if (of == nullptr) continue;  // it has none
+    --of->frames;
+    if (record.is_measured()) {
+      --of->measured;
+      of->share_on_objects -= static_cast<double>(record.share_on_objects);
+    }
     record.reference = {};
     --by_state_[record.state];
     ++by_state_[record.state = TrackingState::kRecentlyLost];
@@ -53,44 +71,65 @@ std::size_t TrajectoryLog::withdraw_after(double timestamp) {
 }
 
 void TrajectoryLog::add_evidence(const LandmarksInView& landmarks) {
-  if (landmarks.all > 0)
-    records_.back().share_on_objects =
-        static_cast<float>(landmarks.on_objects) / static_cast<float>(landmarks.all);
+  if (landmarks.all == 0) return;
+  Record& record = records_.back();
+  record.share_on_objects = static_cast<float>(landmarks.on_objects) / static_cast<float>(landmarks.all);
+  OfReference* of = of_reference(record);
+  if (of != nullptr && record.is_measured())
+    of->share_on_objects += static_cast<double>(record.share_on_objects);
 }
 
 std::set<SubmapId> TrajectoryLog::submaps_on_objects(const Map& map) const {
   constexpr int kFewest = 5;  // frames
   constexpr double kMost = 0.5;
-  struct Evidence {
-    int frames = 0;
-    double share = 0.0;  // sum over the frames
-  };
-  std::map<SubmapId, Evidence> evidence;
-  for (const auto& record : records_) {
-    if (!record.reference.is_valid() || !record.is_measured()) continue;
-    Evidence& of_submap = evidence[map.submap_of(record.reference)];
-    ++of_submap.frames;
-    of_submap.share += static_cast<double>(record.share_on_objects);
+  std::map<SubmapId, OfReference> of_submaps;
+  for (std::uint32_t i = 0; i < of_references_.size(); ++i) {
+    const OfReference& of = of_references_[i];
+    if (of.measured == 0) continue;
+    OfReference& of_submap = of_submaps[map.submap_of(KeyframeId{i})];
+    of_submap.measured += of.measured;
+    of_submap.share_on_objects += of.share_on_objects;
   }
   std::set<SubmapId> found;
-  for (const auto& [submap, e] : evidence) {
-    if (e.frames >= kFewest && e.share > kMost * e.frames) found.insert(submap);
+  for (const auto& [submap, of] : of_submaps) {
+    if (of.measured >= kFewest && of.share_on_objects > kMost * of.measured) found.insert(submap);
   }
   found.erase(main_submap(map));
   return found;
 }
 
 Trajectory TrajectoryLog::trajectory(const Map& map, SubmapId submap) const {
+  return placed(records_, keyframe_poses(map), submap);
+}
+
+std::vector<KeyframePose> TrajectoryLog::keyframe_poses(const Map& map) {
+  std::vector<KeyframePose> poses;
+  poses.reserve(map.keyframe_slots());
+  for (std::uint32_t i = 0; i < map.keyframe_slots(); ++i)
+    poses.push_back({map.submap_of(KeyframeId{i}), map.T_camera_world(KeyframeId{i}).inverse()});
+  return poses;
+}
+
+void TrajectoryLog::copy(std::size_t begin, std::size_t end, std::vector<Record>& records) const {
+  const auto first = records_.begin();
+  records.insert(records.end(), first + static_cast<std::ptrdiff_t>(begin),
+                 first + static_cast<std::ptrdiff_t>(std::min(end, records_.size())));
+}
+
+Trajectory TrajectoryLog::placed(const std::vector<Record>& records,
+                                 const std::vector<KeyframePose>& keyframes, SubmapId submap) {
   Trajectory result;
   constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
   std::size_t measured = kNone;  // position of the last one since which no pose is missing
-  for (const auto& record : records_) {
-    if (!record.reference.is_valid() || map.submap_of(record.reference) != submap) {
+  for (const auto& record : records) {
+    const bool is_here = record.reference.is_valid() && record.reference.index() < keyframes.size() &&
+                         keyframes[record.reference.index()].submap == submap;
+    if (!is_here) {
       measured = kNone;
       continue;
     }
-    const SE3 T_camera_world = record.T_camera_reference * map.T_camera_world(record.reference);
-    result.push_back({record.timestamp, T_camera_world.inverse()});
+    result.push_back({record.timestamp, keyframes[record.reference.index()].T_world_camera *
+                                            record.T_camera_reference.inverse()});
     if (!record.is_measured()) continue;
     if (measured != kNone) interpolate_between(result, measured, result.size() - 1);
     measured = result.size() - 1;
@@ -112,8 +151,8 @@ std::optional<SE3> TrajectoryLog::T_frame_keyframe(const Map& map, std::size_t f
 
 std::map<SubmapId, std::size_t> TrajectoryLog::frames_by_submap(const Map& map) const {
   std::map<SubmapId, std::size_t> frames;
-  for (const auto& record : records_) {
-    if (record.reference.is_valid()) ++frames[map.submap_of(record.reference)];
+  for (std::uint32_t i = 0; i < of_references_.size(); ++i) {
+    if (of_references_[i].frames > 0) frames[map.submap_of(KeyframeId{i})] += of_references_[i].frames;
   }
   return frames;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "roslam/geometry/trajectory.hpp"
+#include "roslam/map/keyframe_pose.hpp"
 #include "roslam/map/map.hpp"
 #include "roslam/slam/frame_result.hpp"
 #include "roslam/tracking/keyframe_policy.hpp"
@@ -44,6 +45,15 @@ class TrajectoryLog {
   /// scene was hidden is interpolated between the measured ones before and after it, if there are such.
   Trajectory trajectory(const Map& map, SubmapId submap) const;
 
+  /// The same in steps, as the map's mutex must not be held for as long as all frames take: the poses of all
+  /// keyframes in one state of the map; the records of frames [begin, end), which never change but by
+  /// withdrawal; and the poses of these frames, for which no mutex is needed.
+  static std::vector<KeyframePose> keyframe_poses(const Map& map);
+  struct Record;
+  void copy(std::size_t begin, std::size_t end, std::vector<Record>& records) const;
+  static Trajectory placed(const std::vector<Record>& records, const std::vector<KeyframePose>& keyframes,
+                           SubmapId submap);
+
   /// The pose of a keyframe in the camera frame of an earlier frame: T_frame_keyframe. Nothing if that frame
   /// has no pose, is of another submap or is more than max_age (seconds) older than the newest frame.
   std::optional<SE3> T_frame_keyframe(const Map& map, std::size_t frame_index, KeyframeId keyframe,
@@ -58,19 +68,27 @@ class TrajectoryLog {
   /// True if a frame was tracked in the map that was loaded.
   bool found_in_loaded_map(const Map& map) const;
 
- private:
   struct Record {
-    std::size_t index;     // of the frame in its source
-    double timestamp;      // seconds
-    KeyframeId reference;  // invalid: not tracked
+    std::size_t index;     ///< of the frame in its source
+    double timestamp;      ///< seconds
+    KeyframeId reference;  ///< invalid: not tracked
     SE3 T_camera_reference;
-    float share_on_objects = 0.0F;  // of the landmarks in view
+    float share_on_objects = 0.0F;  ///< of the landmarks in view
     TrackingState state = TrackingState::kLost;
 
     bool is_measured() const { return state == TrackingState::kTracking; }
   };
 
+ private:
+  struct OfReference {  // of the frames that refer to a keyframe
+    std::size_t frames = 0;
+    int measured = 0;
+    double share_on_objects = 0.0;  // sum over the measured ones
+  };
+  OfReference* of_reference(const Record& record);
+
   std::vector<Record> records_;
+  std::vector<OfReference> of_references_;  // by keyframe id
   std::map<TrackingState, std::size_t> by_state_;
   std::map<RejectReason, std::size_t> rejected_;
   std::size_t clock_resets_ = 0;

@@ -43,6 +43,13 @@ Matrix6d PoseCovariance::of_prediction(const Matrix6d& last, const SE3& T_camera
   return covariance;
 }
 
+// The features of an image share a part of their errors: depth is wrong in patches, and blur and the raster
+// of the pyramid move whole regions. On simulated flights they inform as a fifth as many independent ones.
+Matrix6d PoseCovariance::of_measurement(const Matrix6d& by_measurement) {
+  constexpr double kShared = 5.0;
+  return kShared * by_measurement;
+}
+
 Matrix6d PoseCovariance::of_frame(const Map& map, const SE3& T_camera_world,
                                   std::span<const LandmarkId> landmarks,
                                   const Matrix6d& by_measurement) const {
@@ -54,10 +61,7 @@ Matrix6d PoseCovariance::of_frame(const Map& map, const SE3& T_camera_world,
     ++created[landmark->created_by];
     ++count;
   }
-  // The features of an image share a part of their errors: depth is wrong in patches, and blur and the raster
-  // of the pyramid move whole regions. On simulated flights they inform as a fifth as many independent ones.
-  constexpr double kShared = 5.0;
-  Matrix6d covariance = kShared * by_measurement;
+  Matrix6d covariance = of_measurement(by_measurement);
   for (const auto& [keyframe, landmarks_of_it] : created) {
     if (keyframe.index() >= keyframes_.size()) continue;
     const SE3 T_camera_keyframe = T_camera_world * map.T_camera_world(keyframe).inverse();

@@ -29,6 +29,9 @@ class PoseCovariance {
   Matrix6d of_frame(const Map& map, const SE3& T_camera_world, std::span<const LandmarkId> landmarks,
                     const Matrix6d& by_measurement) const;
 
+  /// Of the measurement of a pose alone, with errors as they are. by_measurement: as in of_frame().
+  static Matrix6d of_measurement(const Matrix6d& by_measurement);
+
   /// Of a pose that was extrapolated over so many seconds from one of that covariance.
   static Matrix6d of_prediction(const Matrix6d& last, const SE3& T_camera_last, double seconds);
 

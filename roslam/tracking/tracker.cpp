@@ -12,17 +12,6 @@
 
 namespace roslam {
 
-namespace {
-// The first camera defines the world frame, assumed level: x forward, y left, z up (REP 103).
-SE3 first_T_camera_world() {
-  Eigen::Matrix3d R;
-  R << 0, -1, 0,  //
-      0, 0, -1,   //
-      1, 0, 0;
-  return {R, Eigen::Vector3d::Zero()};
-}
-}  // namespace
-
 Tracker::Tracker(const Camera& camera, Map& map, const Settings& settings)
     : camera_(camera),
       map_(map),
@@ -51,7 +40,7 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
   frame.landmarks.resize(view->size());
   frame.view = std::move(view);
   if (map_.keyframe_count() == 0) {
-    return can_start(frame, hint) ? initialise(std::move(frame)) : frame;
+    return can_start(frame, hint) ? initialise(std::move(frame), hint.T_camera_start) : frame;
   }
 
   is_contradiction_ = false;
@@ -73,7 +62,7 @@ TrackedFrame Tracker::track(std::shared_ptr<const ObservedFrame> view, double ti
     state_ = TrackingState::kPredicted;
   } else if (const bool could_start = can_start(frame, hint);
              could_start && ++frames_unrecognised_ == settings_.tracker.new_submap_after_lost) {
-    return initialise(std::move(frame));
+    return initialise(std::move(frame), hint.T_camera_start);
   } else {
     ++frames_lost_;
     state_ = frames_lost_ <= settings_.tracker.recently_lost_frames ? TrackingState::kRecentlyLost
@@ -101,7 +90,7 @@ void Tracker::withhold_poor_fit(TrackedFrame& frame) {
   if (!is_poor_fit(frame)) {
     last_fit_ = frame.timestamp;
   } else if (last_fit_ && frame.timestamp - *last_fit_ <= kLongest) {
-    ++doubts_[PoseDoubt::kPoorFit];
+    ++doubts_[frame.doubt = PoseDoubt::kPoorFit];
     frame.state = TrackingState::kRecentlyLost;
     drop_pose(frame);
   }
@@ -122,8 +111,9 @@ bool Tracker::can_start(const TrackedFrame& frame, const FrameHint& hint) {
 }
 
 // The first frame of a submap.
-TrackedFrame Tracker::initialise(TrackedFrame frame) {
-  frame.T_camera_world = first_T_camera_world();
+TrackedFrame Tracker::initialise(TrackedFrame frame, const SE3& T_camera_world) {
+  frame.T_camera_world = T_camera_world;
+  frame.doubt = PoseDoubt::kNone;
   frame.landmarks.assign(frame.view->size(), {});
   frame.reference = {};
   frame.inliers = 0;
@@ -201,13 +191,15 @@ PoseDoubt Tracker::doubt_of(const TrackedFrame& frame, int min_inliers) const {
 }
 
 // A pose is not refused because it does not fit tentative ones, if it is strong and fits those before.
-bool Tracker::is_accepted(const TrackedFrame& frame, int min_inliers) {
+bool Tracker::is_accepted(TrackedFrame& frame, int min_inliers) {
   const PoseDoubt doubt = doubt_of(frame, min_inliers);
+  frame.doubt = doubt;
   const bool is_by_motion = doubt == PoseDoubt::kSpeed || doubt == PoseDoubt::kAcceleration ||
                             doubt == PoseDoubt::kTurnRate || doubt == PoseDoubt::kGyroscope;
   const TrackedState* confirmed =
       is_by_motion && is_strong(frame) ? confirmed_here(frame.reference, frame.timestamp) : nullptr;
   is_contradiction_ = confirmed != nullptr && motion_.doubt(*confirmed, frame) == PoseDoubt::kNone;
+  if (is_contradiction_) frame.doubt = PoseDoubt::kNone;
   if (is_contradiction_) return true;
   if (doubt != PoseDoubt::kNone) ++doubts_[doubt];
   if (doubt == PoseDoubt::kGyroscope && is_strong(frame)) motion_.note_refusal();
@@ -426,7 +418,30 @@ bool Tracker::contradicts_last(const TrackedFrame& frame) {
   return !same || other->inliers > kBetter * same->inliers;
 }
 
-void Tracker::remember(const TrackedFrame& frame) {
+// The pose of an earlier frame by its landmarks as they are now. Where mapping has moved them, it does not
+// move with its reference alone.
+SE3 Tracker::measured_again(const TrackedState& state) const {
+  const SE3 T_camera_world = *state.T_camera_world(map_);
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<std::uint32_t> points;
+  std::vector<LandmarkId> landmarks(state.frame.landmarks.size());
+  for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
+    const LandmarkId id = map_.resolve(state.frame.landmarks[i]);
+    const Landmark* landmark = id.is_valid() ? map_.find(id) : nullptr;
+    if (landmark == nullptr) continue;
+    landmarks[i] = id;
+    positions.push_back(landmark->position);
+    points.push_back(i);
+  }
+  if (static_cast<int>(points.size()) < settings_.tracker.trusted_inliers) return T_camera_world;
+  const OptimisedPose pose = optimise_frame(camera_, map_, *state.frame.view, points, positions,
+                                            T_camera_world, settings_.noise, settings_.pose, landmarks, {});
+  return pose.inliers >= settings_.tracker.trusted_inliers ? pose.T_camera_world : T_camera_world;
+}
+
+void Tracker::remember(TrackedFrame& frame) {
+  if (is_same_submap(map_, last_.frame.reference, frame.reference))
+    frame.motion = {last_.frame.timestamp, *frame.T_camera_world * measured_again(last_).inverse()};
   const auto velocity = motion_.velocity(last_, frame);
   last_ = {frame, *frame.T_camera_world * map_.T_camera_world(frame.reference).inverse(), velocity};
   motion_.learn(last_);

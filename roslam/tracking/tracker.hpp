@@ -37,6 +37,8 @@ struct FrameHint {
   cv::Mat depth = {};                 ///< CV_32FC1 metres, 0 = unknown; tells what is occluded; may be empty
   std::vector<std::uint8_t> rested = {};  ///< as RestingPoints: where few points are static
   bool may_start = true;  ///< false where movable objects fill the image, on which no map must start
+  SE3 T_camera_start =
+      forward_camera().inverse();  ///< T_camera_world that a submap begins with at this frame
 
   /// Keyframes similar to the frame, best first; called only to relocalise. May be empty.
   std::function<std::vector<KeyframeId>()> similar_keyframes = {};
@@ -108,7 +110,7 @@ class Tracker {
   static void drop_pose(TrackedFrame& frame);
   void withhold_poor_fit(TrackedFrame& frame);
   bool can_start(const TrackedFrame& frame, const FrameHint& hint);
-  TrackedFrame initialise(TrackedFrame frame);
+  TrackedFrame initialise(TrackedFrame frame, const SE3& T_camera_world);
   bool follow(TrackedFrame& frame, const FrameHint& hint);
   std::vector<SE3> predictions(double timestamp, const std::optional<SE3>& by_flow) const;
   bool accept_best(TrackedFrame& frame, std::vector<PoseCandidate> candidates, const FrameHint& hint);
@@ -116,7 +118,7 @@ class Tracker {
   void refine_with_local_map(TrackedFrame& frame, PoseCandidate candidate, KeyframeId near,
                              const cv::Mat& depth);
   PoseDoubt doubt_of(const TrackedFrame& frame, int min_inliers) const;
-  bool is_accepted(const TrackedFrame& frame, int min_inliers);
+  bool is_accepted(TrackedFrame& frame, int min_inliers);
   bool predict_hidden(TrackedFrame& frame, const FrameHint& hint);
   bool relocalise(TrackedFrame& frame, const FrameHint& hint);
   void match_local_landmarks(TrackedFrame& frame, const cv::Mat& depth);
@@ -128,7 +130,8 @@ class Tracker {
   bool is_strong(const TrackedFrame& frame) const;
   void reconsider(TrackedFrame& frame);
   bool contradicts_last(const TrackedFrame& frame);
-  void remember(const TrackedFrame& frame);
+  SE3 measured_again(const TrackedState& state) const;
+  void remember(TrackedFrame& frame);
 
   Camera camera_;
   Map& map_;

@@ -46,6 +46,14 @@ CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
   return source;
 }
 
+void add_mount_option(CLI::App& command, SourceArguments& arguments) {
+  command.add_option(
+      "--mount", arguments.mount,
+      "How the camera is mounted on the drone: X,Y,Z,ROLL,PITCH,YAW of its housing in the body "
+      "frame (x forward, y left, z up; metres, degrees; positive pitch looks down); default as the "
+      "camera file says, else looking ahead");
+}
+
 void add_degrade_option(CLI::App& command, SourceArguments& arguments) {
   command
       .add_option(
@@ -97,6 +105,9 @@ std::optional<SimulatorOptions> simulated_flight(const SourceArguments& argument
     throw InputError("--camera " + arguments.camera +
                      ": a simulated flight has a camera of its own; leave it out");
   }
+  if (!arguments.mount.empty())
+    throw InputError("--mount " + arguments.mount +
+                     ": a simulated flight knows how its camera is mounted; leave it out");
   SimulatorOptions options;
   options.path = *path;
   options.traffic = *traffic;
@@ -148,7 +159,9 @@ std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments) {
     throw InputError("--frames " + std::to_string(arguments.frames) +
                      ": is for a simulated flight only; leave it out with a recording");
   }
-  return std::make_unique<TumSource>(arguments.name, load_camera(arguments.camera));
+  Camera camera = load_camera(arguments.camera);
+  if (!arguments.mount.empty()) camera.T_body_camera = mount_from(arguments.mount);
+  return std::make_unique<TumSource>(arguments.name, camera);
 }
 
 std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {

@@ -16,8 +16,9 @@
 namespace roslam::app {
 
 struct SourceArguments {
-  std::string name;               ///< a TUM folder or simulated:street|loop|hover|turn
-  std::string camera;             ///< a preset or a file; not needed for a simulated flight
+  std::string name;        ///< a TUM folder or simulated:street|loop|hover|turn
+  std::string camera;      ///< a preset or a file; not needed for a simulated flight
+  std::string mount = {};  ///< of the camera on the drone: X,Y,Z,ROLL,PITCH,YAW; empty: as the camera file
   std::string traffic = "light";  ///< the rest: of a simulated flight; none, light, heavy
   std::size_t frames = 0;         ///< 0 = the whole flight
   std::uint32_t seed = 1;
@@ -36,6 +37,9 @@ CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments);
 
 /// Adds the options of simulated flights: --traffic, --frames, --seed and so on.
 void add_flight_options(CLI::App& command, SourceArguments& arguments);
+
+/// Adds --mount.
+void add_mount_option(CLI::App& command, SourceArguments& arguments);
 
 /// Adds --degrade.
 void add_degrade_option(CLI::App& command, SourceArguments& arguments);

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "apps/roslam/flight.hpp"
+#include "apps/roslam/run/flight.hpp"
+#include "apps/roslam/run/run_summary.hpp"
 #include "apps/roslam/support/backend_option.hpp"
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/interrupt.hpp"
 #include "apps/roslam/support/output.hpp"
+#include "roslam/common/error.hpp"
 
 namespace roslam::app {
 
@@ -18,92 +21,11 @@ using namespace recording;
 namespace {
 struct RunArguments {
   FlightArguments flight;
+  std::string resume;
   bool print_config = false;
   bool json = false;
   bool strict = false;
 };
-
-void print_map(const Slam& slam, bool has_map) {
-  if (has_map && !slam.found_in_loaded_map()) {
-    std::printf("note: the camera was not localised in the loaded map; poses are in a frame of their own\n");
-  }
-  for (const auto& loop : slam.loops()) {
-    std::printf("loop: keyframe %u matched keyframe %u and was corrected by %.3f m, %.2f degrees%s\n",
-                loop.keyframe.value, loop.matched_keyframe.value, loop.moved, loop.turned * 180.0 / M_PI,
-                loop.merges_submaps ? "; two submaps were merged" : "");
-  }
-  const auto on_objects = slam.submaps_on_objects();
-  for (const auto& [submap, frames] : slam.frames_in_other_submaps()) {
-    std::printf("note: %zu frames are in a submap that was %s; trajectory.txt lacks them\n", frames,
-                on_objects.count(submap) > 0 ? "mapped on movable objects and dropped"
-                                             : "not merged with the main one");
-  }
-  std::printf("map: %zu keyframes, %zu landmarks\n", slam.map().keyframe_count(),
-              slam.map().landmark_count());
-}
-
-void print_dense(const DenseMap& dense) {
-  std::printf("dense map: %zu points, voxels of %g m, %zu keyframes", dense.surface.points.size(),
-              dense.voxel_size, dense.keyframes);
-  if (dense.dropped > 0) std::printf(", %zu dropped", dense.dropped);
-  std::printf("\n");
-  if (dense.surface.points.empty())
-    std::printf("note: the dense map is empty: %s\n", std::string(why_empty(dense)).c_str());
-  if (dense.times_coarsened > 0)
-    std::printf("note: voxels are %d times as large as configured, to stay within dense.max_memory\n",
-                1 << dense.times_coarsened);
-  for (const auto& [fault, count] : dense.faults)
-    std::printf("note: keyframe not fused into the dense map: %s (%zu times)\n", fault.c_str(), count);
-}
-
-void print_restoration(const Flight& flight) {
-  std::printf("restored: %zu keyframes, %zu dropped\n", flight.restored, flight.slam->unrestored());
-  for (const auto& [fault, count] : flight.slam->restoration_faults())
-    std::printf("note: keyframe not restored: %s (%zu times)\n", fault.c_str(), count);
-}
-
-void print_frames(const Slam& slam, const RunResults& summary, const FrameSource& source) {
-  const FrameCounts counts = count_frames(slam, summary, source);
-  constexpr double kFew = 0.9;
-  const bool is_few = counts.pose_share() < kFew && !summary.interrupted;
-  std::printf("%s%s%s\n", is_few ? "WARNING: " : "", counts.in_words().c_str(),
-              summary.interrupted ? ", interrupted" : "");
-  for (const auto& [warning, frames] : slam.warnings())
-    std::printf("WARNING: %s%s\n", warning.c_str(),
-                frames > 1 ? (" (" + std::to_string(frames) + " frames)").c_str() : "");
-  for (const auto& [note, number] : source.notes())
-    std::printf("note: %s%s\n", note.c_str(),
-                number > 1 ? (" (" + std::to_string(number) + " times)").c_str() : "");
-}
-
-void print_summary(const Flight& flight, const FlightArguments& arguments) {
-  const Slam& slam = *flight.slam;
-  const RunResults& summary = flight.summary;
-  const auto times = slam.times().summary();
-  print_frames(slam, summary, *flight.source);
-  if (summary.removal && summary.removal->frames > 0) {
-    const RemovalTally& tally = *summary.removal;
-    std::printf("removed: %.1f %% of the image area on average",
-                100.0 * tally.removed_area / static_cast<double>(tally.frames));
-    if (tally.predicted > 0)
-      std::printf("; %zu frames predicted while the static scene was hidden", tally.predicted);
-    std::printf("\n");
-  }
-  for (const auto& [fault, count] : slam.labelling_faults()) {
-    std::printf("note: %s (%zu times)\n", fault.c_str(), count);
-  }
-  if (slam.clock_resets() > 0)
-    std::printf("note: the clock of the source restarted (%zu times)\n", slam.clock_resets());
-  for (const auto& [fault, count] : slam.loop_faults())
-    std::printf("note: loop closing was switched off after it failed: %s\n", fault.c_str());
-  print_map(slam, !arguments.map.empty());
-  if (summary.dense) print_dense(*summary.dense);
-  if (const auto found = times.find("tracking"); found != times.end()) {
-    std::printf("tracking: median %.1f ms, p95 %.1f ms of processor time per frame\n",
-                found->second.median_ms, found->second.p95_ms);
-  }
-  std::printf("results: %s\n", arguments.out.c_str());
-}
 
 void check(const FlightArguments& arguments, const Options& options) {
   if (arguments.source.name.empty()) throw CLI::RequiredError("SOURCE");
@@ -136,7 +58,24 @@ void require_complete(const Flight& flight) {
     throw IncompleteRun("--strict: " + warnings.begin()->first);
 }
 
+// A run that was killed before its first checkpoint has no map to go on from.
+void resume(RunArguments& arguments) {
+  if (arguments.resume.empty()) return;
+  FlightArguments& flight = arguments.flight;
+  if (!std::filesystem::is_directory(arguments.resume))
+    throw InputError(arguments.resume + ": no folder of a run to resume; give one, or --out for a new run");
+  flight.out = arguments.resume;
+  flight.resume = true;
+  const std::filesystem::path map = std::filesystem::path(arguments.resume) / "map.roslam";
+  if (std::filesystem::exists(map)) {
+    flight.map = map.string();
+  } else {
+    std::cerr << "note: " << map.string() << ": not there, so that a new map begins\n";
+  }
+}
+
 void execute(RunArguments arguments, const std::string& version) {
+  resume(arguments);
   const Options options = options_of(arguments.flight);
   if (arguments.print_config) {
     std::cout << options_to_yaml(options);
@@ -172,6 +111,7 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "Writes to the folder RUN of --out:\n"
       "  report.html trajectory.png   the run in figures and tables\n"
       "  trajectory.txt keyframes.txt camera poses of frames and keyframes (TUM format)\n"
+      "  odometry.csv                 continuous pose and velocity of the drone, with covariances\n"
       "  groundtruth.txt              true poses, where the source has them (TUM format)\n"
       "  dense.ply dense.bt           dense map: points and triangles; free and occupied space (OctoMap)\n"
       "  map.ply map.roslam           landmarks; the map file for --map and roslam map\n"
@@ -186,6 +126,7 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "but not\n"
       "every frame of the source has a pose, or the input is doubtful (a WARNING).");
   add_source_options(*command, arguments->flight.source);
+  add_mount_option(*command, arguments->flight.source);
   command->add_option("--out", arguments->flight.out,
                       "Folder the results are written to; made if it does not exist (required)");
   command->add_option("--config", arguments->flight.config,
@@ -215,11 +156,23 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command->add_option(
       "--map", arguments->flight.map,
       "Continue from the map of an earlier run with the same camera (its folder or map.roslam)");
+  command
+      ->add_option(
+          "--resume", arguments->resume,
+          "Go on with the run in this folder, such as after a power cut: from its last saved map, in a new "
+          "submap until the place is recognised; its results so far are kept in RESUME/sessions")
+      ->excludes("--out")
+      ->excludes("--map");
   command->add_flag("--localise-only", arguments->flight.localise_only,
                     "Localise in --map without changing the map");
   add_flight_options(*command, arguments->flight.source);
   add_degrade_option(*command, arguments->flight.source);
   command->add_flag("--print-config", arguments->print_config, "Print the effective options (YAML) and exit");
+  command
+      ->add_option("--checkpoint", arguments->flight.checkpoint,
+                   "Seconds between two saved maps (map.roslam) during the run; 0: only at its end")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   command->add_flag("--video", arguments->flight.video,
                     "Write removal.avi too: each frame with kept and removed points");
   command->add_flag("--no-dense", arguments->flight.no_dense,

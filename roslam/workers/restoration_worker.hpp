@@ -15,10 +15,10 @@
 #include "roslam/options/options.hpp"
 #include "roslam/restoration/static_scene_restorer.hpp"
 #include "roslam/sensors/frame_source.hpp"
-#include "roslam/slam/keyframe_jobs.hpp"
-#include "roslam/slam/keyframe_worker.hpp"
-#include "roslam/slam/load_control.hpp"
-#include "roslam/slam/restored_keyframe.hpp"
+#include "roslam/workers/keyframe_jobs.hpp"
+#include "roslam/workers/keyframe_worker.hpp"
+#include "roslam/workers/load_control.hpp"
+#include "roslam/workers/restored_keyframe.hpp"
 
 namespace roslam {
 

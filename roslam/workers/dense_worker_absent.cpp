@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // In place of dense_worker.cpp in a library without the component dense.
 #include "roslam/common/error.hpp"
-#include "roslam/slam/dense_worker.hpp"
+#include "roslam/workers/dense_worker.hpp"
 
 namespace roslam {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/slam/restoration_worker.hpp"
+#include "roslam/workers/restoration_worker.hpp"
 
 #include <exception>
 #include <utility>
 
 #include "roslam/common/stopwatch.hpp"
 #include "roslam/common/thread_priority.hpp"
-#include "roslam/slam/settings.hpp"
+#include "roslam/options/settings.hpp"
 
 namespace roslam {
 

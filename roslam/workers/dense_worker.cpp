@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/slam/dense_worker.hpp"
+#include "roslam/workers/dense_worker.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,8 +18,8 @@
 #include "roslam/geometry/se3f.hpp"
 #include "roslam/restoration/source_image.hpp"
 #include "roslam/semantics/label_set.hpp"
-#include "roslam/slam/keyframe_jobs.hpp"
-#include "roslam/slam/keyframe_worker.hpp"
+#include "roslam/workers/keyframe_jobs.hpp"
+#include "roslam/workers/keyframe_worker.hpp"
 
 namespace roslam {
 

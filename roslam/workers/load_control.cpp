@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/slam/load_control.hpp"
+#include "roslam/workers/load_control.hpp"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/slam/keyframe_worker.hpp"
+#include "roslam/workers/keyframe_worker.hpp"
 
 #include <utility>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "apps/roslam/flight.hpp"
+#include "apps/roslam/run/flight.hpp"
 
 #include <exception>
 #include <filesystem>
@@ -12,6 +12,7 @@
 #include "apps/roslam/support/output.hpp"
 #include "apps/roslam/support/progress.hpp"
 #include "apps/roslam/support/restored_folder.hpp"
+#include "recording/flight_log.hpp"
 #include "recording/process_info.hpp"
 #include "recording/removal_log.hpp"
 #include "recording/restoration_image.hpp"
@@ -51,14 +52,15 @@ void require_poses(const Slam& slam, const RunResults& summary, const FrameSourc
 }
 
 // Tracks every frame and notes what is removed from it.
-RunResults track(FrameSource& source, Slam& slam, std::optional<RemovalLog>& log, bool quiet,
-                 const std::stop_token& stop) {
+RunResults track(FrameSource& source, Slam& slam, FlightLog& flight_log, std::optional<RemovalLog>& log,
+                 bool quiet, const std::stop_token& stop) {
   Progress progress(source.size(), quiet);
   double start_up_seconds = -1.0;
   RunResults results;
   static_cast<RunSummary&>(results) = run_slam(
       source, slam,
       [&](const Frame& frame, const FrameResult& result) {
+        flight_log.add(result);
         if (log) log->add(frame, result);
         for (const std::string& warning : result.warnings) progress.print("warning: " + warning);
         if (start_up_seconds < 0.0 && result.T_world_camera) start_up_seconds = process_age();
@@ -146,6 +148,7 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   flight.description.version = version;
   if (!arguments.map.empty()) flight.description.map = map_file(arguments.map).string();
   flight.description.flight = flight_in_words(arguments.source);
+  flight.description.resumes = arguments.resume;
   if (flight.slam->options().dynamic_objects.labels)
     flight.description.segmentation_model =
         arguments.model.empty() ? find_segmentation_model().string() : arguments.model;
@@ -156,7 +159,9 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   std::optional<RemovalLog> log;
   if (flight.slam->options().dynamic_objects.is_on())
     log.emplace(RemovalLog::Settings{folder.path(), mode, camera.fps, arguments.video});
-  flight.summary = track(*flight.source, *flight.slam, log, arguments.quiet, stop);
+  FlightLog flight_log({folder.path(), arguments.checkpoint, flight.slam->options().keyframes.enabled},
+                       *flight.slam);
+  flight.summary = track(*flight.source, *flight.slam, flight_log, log, arguments.quiet, stop);
   // A step that fails must not cost the results of the others.
   std::exception_ptr failure;
   const auto attempt = [&](const auto& step) {
@@ -166,6 +171,7 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
       if (!failure) failure = std::current_exception();
     }
   };
+  flight_log.stop();
   // The trajectory and the map before what may take long.
   std::exception_ptr unwritten;
   try {
@@ -174,6 +180,8 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
     unwritten = std::current_exception();
   }
   if (log) attempt([&] { log->finish(); });
+  attempt([&] { flight_log.finish(); });
+  flight.summary.saving_faults = flight_log.faults();
   // A log that failed has removed its files: on a full disk there may be room now.
   if (unwritten && failure) attempt([&] { folder.write_flight(*flight.slam); });
   if (!failure) failure = unwritten;

@@ -22,9 +22,11 @@ struct FlightArguments {
   std::string model;       ///< weights in place of the shipped ones
   std::string vocabulary;  ///< words in place of the shipped ones
   bool no_loops = false;
-  std::string map;  ///< to go on from; empty: none
+  std::string map;      ///< to go on from; empty: none
+  bool resume = false;  ///< go on with the run in `out`, whose results so far are kept
   bool localise_only = false;
-  std::string dynamic;  ///< empty: as the options say
+  std::string dynamic;       ///< empty: as the options say
+  double checkpoint = 30.0;  ///< seconds between two saved maps; 0: none before the end
   bool video = false;
   bool no_dense = false;  ///< make no dense map
   bool restore = false;   ///< write the keyframes without what moves to the folder restored

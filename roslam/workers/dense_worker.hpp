@@ -14,7 +14,7 @@
 #include "roslam/options/options.hpp"
 #include "roslam/restoration/restored_image.hpp"
 #include "roslam/sensors/frame_source.hpp"
-#include "roslam/slam/load_control.hpp"
+#include "roslam/workers/load_control.hpp"
 
 namespace roslam {
 

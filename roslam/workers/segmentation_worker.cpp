@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/slam/segmentation_worker.hpp"
+#include "roslam/workers/segmentation_worker.hpp"
 
 #include <chrono>
 #include <condition_variable>

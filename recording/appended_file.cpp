@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recording/appended_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <utility>
+
+#include "roslam/common/error.hpp"
+#include "roslam/common/write_file.hpp"
+
+namespace roslam::recording {
+
+AppendedFile::AppendedFile(std::filesystem::path file, std::string_view header) : file_(std::move(file)) {
+  write_file(file_, header);
+  open();
+}
+
+AppendedFile::~AppendedFile() {
+  if (descriptor_ >= 0) close(descriptor_);
+}
+
+void AppendedFile::open() {
+  if (descriptor_ >= 0) close(descriptor_);
+  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  struct stat status {};
+  if (descriptor_ < 0 || fstat(descriptor_, &status) != 0)
+    throw OutputError(file_.string() + ": cannot be opened for appending; choose another --out");
+  size_ = static_cast<std::size_t>(status.st_size);
+}
+
+bool AppendedFile::append(std::string_view lines) {
+  std::size_t written = 0;
+  while (written < lines.size()) {
+    const ssize_t count = write(descriptor_, lines.data() + written, lines.size() - written);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) break;
+    written += static_cast<std::size_t>(count);
+  }
+  if (written < lines.size()) {
+    // A part of a line would pass for another one.
+    if (written > 0 && ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) size_ += written;
+    return false;
+  }
+  size_ += lines.size();
+  fdatasync(descriptor_);
+  return true;
+}
+
+void AppendedFile::replace(std::string_view content) {
+  replace_file(file_, content);
+  open();
+}
+
+}  // namespace roslam::recording
