@@ -99,6 +99,21 @@ TEST(FrameQueue, HandsTheInertialSamplesOfDroppedFramesToTheNext) {
   EXPECT_GT(queue.dropped(), 20U);
 }
 
+TEST(FrameQueue, GivesTheNewestWhereTheLatencyMatters) {
+  FrameQueue queue(2, FrameQueue::Policy::kNewest);
+  for (std::size_t i = 0; i < 5; ++i) {
+    Frame frame = numbered(i);
+    frame.inertial.push_back({static_cast<double>(i)});
+    queue.push(std::move(frame));
+  }
+  const auto frame = queue.pop();
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->index, 4U);
+  EXPECT_EQ(frame->inertial.size(), 5U) << "those of dropped frames as well";
+  EXPECT_EQ(queue.dropped(), 4U);
+  EXPECT_EQ(queue.longest_gap(), 4U);
+}
+
 TEST(FrameQueue, EndsWithAllThatWaitsOrWithNothing) {
   FrameQueue closed(2);
   push(closed, 0, 5);

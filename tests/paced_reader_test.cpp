@@ -10,6 +10,7 @@
 #include <future>
 #include <limits>
 #include <mutex>
+#include <stop_token>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -59,6 +60,7 @@ class FakeSource : public FrameSource {
   }
 
   const Camera& camera() const override { return camera_; }
+  bool is_live() const override { return is_a_camera; }
 
   // Until next() was called after the last frame: the reader has queued all frames.
   bool wait_for_end() {
@@ -77,6 +79,7 @@ class FakeSource : public FrameSource {
   }
 
   Clock::duration opening{};  // that the first call takes
+  bool is_a_camera = false;
 
  private:
   std::vector<double> timestamps_;
@@ -125,6 +128,38 @@ double expect_pace(FakeSource& source, const std::vector<double>& earliest) {
 TEST(PacedReader, HandsOutFramesNoEarlierThanTheirTimestamps) {
   FakeSource source({50.0, 50.02, 50.03, 50.1, 50.11, 50.25});
   expect_pace(source, {0.0, 0.02, 0.03, 0.1, 0.11, 0.25});
+}
+
+// Its clock may run faster or slower than that of this computer, or jump.
+TEST(PacedReader, ACameraIsNotPacedByItsTimestamps) {
+  FakeSource source({50.0, 60.0, 1.0, 900.0});
+  source.is_a_camera = true;
+  const auto begun = Clock::now();
+  PacedReader reader(source, 100);
+  ASSERT_TRUE(source.wait_for_end());
+  const auto frame = reader.next();
+  ASSERT_TRUE(frame);
+  EXPECT_LT(Clock::now() - begun, std::chrono::milliseconds(900));
+  EXPECT_EQ(frame->index, 3U) << "the newest";
+  EXPECT_EQ(reader.dropped(), 3U);
+  ASSERT_TRUE(frame->received);
+  EXPECT_GE(*frame->received, begun);
+  EXPECT_LE(*frame->received, Clock::now());
+}
+
+TEST(PacedReader, ACameraThatStallsIsLeftSoonAfterAStop) {
+  FakeSource source({1.0}, End::kStall);
+  source.is_a_camera = true;
+  std::stop_source stop;
+  FrameSource& camera = source;
+  EXPECT_TRUE(camera.next(stop.get_token()));
+  auto waiting = std::async(std::launch::async, [&] { return camera.next(stop.get_token()).has_value(); });
+  ASSERT_TRUE(source.wait_for_end());
+  const auto asked = Clock::now();
+  stop.request_stop();
+  EXPECT_FALSE(waiting.get());
+  EXPECT_LT(Clock::now() - asked, std::chrono::milliseconds(200));
+  EXPECT_FALSE(camera.next(stop.get_token())) << "asked after the stop";
 }
 
 TEST(PacedReader, TheClockStartsWithTheFirstFrameHoweverLongTheSourceTakesToOpen) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "roslam/common/error.hpp"
@@ -42,7 +43,12 @@ void DenseMapper::insert(KeyframeId id, const DepthKeyframe& keyframe, const Key
   if (!depth || !pose.T_world_camera.is_finite() || !pose.submap.is_valid()) return;
   if (voxel_size_ == 0.0) voxel_size_ = *depth < kIndoors ? kFineVoxel : kWideVoxel;
   Fused fused{pack(keyframe), pose, *depth};
-  map_of(pose.submap).integrate(unpack(fused.keyframe), pose.T_world_camera);
+  const DepthKeyframe unpacked = unpack(fused.keyframe);
+  map_of(pose.submap).integrate(unpacked, pose.T_world_camera);
+  if (changes_.are_kept) {
+    changes_.before.try_emplace(id);
+    changes_.blocks[pose.submap].merge(map_of(pose.submap).affected_blocks(unpacked, pose.T_world_camera));
+  }
   view_bytes_ += fused.keyframe.bytes();
   fused_.insert_or_assign(id, std::move(fused));
   limit_memory();
@@ -76,11 +82,23 @@ std::size_t DenseMapper::follow(const std::map<KeyframeId, KeyframePose>& poses,
     moved.push_back(&*pose);
   }
   for (const KeyframeId id : withdrawn) {
-    view_bytes_ -= fused_.at(id).keyframe.bytes();
+    Fused& fused = fused_.at(id);
+    view_bytes_ -= fused.keyframe.bytes();
+    if (changes_.are_kept) {
+      changes_.before.try_emplace(id, fused.pose);
+      changes_.gone.try_emplace(id, std::move(fused));
+    }
     fused_.erase(id);
   }
-  for (const auto* pose : moved) fused_.at(pose->first).pose = pose->second;
+  for (const auto* pose : moved) {
+    Fused& fused = fused_.at(pose->first);
+    if (changes_.are_kept) changes_.before.try_emplace(pose->first, fused.pose);
+    fused.pose = pose->second;
+  }
   for (const auto& [submap, blocks] : stale) reintegrate(submap, blocks);
+  if (changes_.are_kept) {
+    for (auto& [submap, blocks] : stale) changes_.blocks[submap].merge(blocks);
+  }
   limit_memory();
   return moved.size() + withdrawn.size();
 }
@@ -114,10 +132,37 @@ void DenseMapper::limit_memory() {
   while (voxel_bytes() > static_cast<std::size_t>(options_.max_memory) * kMegabyte) {
     voxel_size_ *= 2.0;
     ++times_coarsened_;
+    changes_ = {};
     maps_.clear();
     for (const auto& [id, fused] : fused_)
       map_of(fused.pose.submap).integrate(unpack(fused.keyframe), fused.pose.T_world_camera);
   }
+}
+
+DenseChanges DenseMapper::take_changes() {
+  const Changes taken = std::exchange(changes_, {});
+  changes_.are_kept = true;
+  if (!taken.are_kept) return all();
+  DenseChanges result;
+  result.blocks = taken.blocks;
+  for (const auto& [id, before] : taken.before) {
+    if (const auto fused = fused_.find(id); fused != fused_.end()) {
+      result.keyframes.push_back({unpack(fused->second.keyframe), before, fused->second.pose});
+    } else if (const auto gone = taken.gone.find(id); gone != taken.gone.end() && before.submap.is_valid()) {
+      result.keyframes.push_back({unpack(gone->second.keyframe), before, {}});
+    }
+  }
+  return result;
+}
+
+DenseChanges DenseMapper::all() const {
+  DenseChanges result;
+  result.is_all = true;
+  for (const auto& [id, fused] : fused_) result.keyframes.push_back({unpack(fused.keyframe), {}, fused.pose});
+  for (const auto& [submap, map] : maps_) {
+    for (const BlockKey& key : map.keys()) result.blocks[submap].insert(key);
+  }
+  return result;
 }
 
 std::size_t DenseMapper::voxel_bytes() const {

@@ -17,6 +17,17 @@
 
 namespace roslam {
 
+/// How a dense map changed.
+struct DenseChanges {
+  struct Moved {
+    DepthKeyframe keyframe;
+    KeyframePose before, now;  ///< without a submap: it was not in, or is not any more
+  };
+  std::vector<Moved> keyframes;
+  std::map<SubmapId, BlockSet> blocks;  ///< of voxels
+  bool is_all = false;                  ///< all there is, as if nothing had been there before
+};
+
 /// Fuses keyframes into a TSDF volume for each submap and follows pose corrections: blocks affected by moved
 /// keyframes are erased and re-integrated, so that the map equals one fused at the corrected poses. Not
 /// thread-safe.
@@ -50,6 +61,13 @@ class DenseMapper {
   void visit(SubmapId submap,
              const std::function<void(const DepthKeyframe&, const SE3& T_world_camera)>& visitor) const;
 
+  /// What changed since the last call; all, in the first and after the voxels became larger. Costs the mapper
+  /// time from the first call on.
+  DenseChanges take_changes();
+
+  /// Makes the next call give all.
+  void restart_changes() { changes_ = {}; }
+
   double voxel_size() const { return voxel_size_; }       ///< metres; 0 before the first keyframe
   std::size_t voxel_bytes() const;                        ///< of all submaps
   std::size_t view_bytes() const { return view_bytes_; }  ///< of keyframes kept for re-integration
@@ -67,6 +85,15 @@ class DenseMapper {
   void reintegrate(SubmapId submap, const BlockSet& blocks);
   bool is_in_reach(const Fused& fused, const TsdfVolume& map, const BlockSet& blocks) const;
   void limit_memory();
+  DenseChanges all() const;
+
+  // What take_changes() has not given yet.
+  struct Changes {
+    std::map<KeyframeId, KeyframePose> before;  // without a submap: new
+    std::map<KeyframeId, Fused> gone;
+    std::map<SubmapId, BlockSet> blocks;
+    bool are_kept = false;  // false: all changed
+  };
 
   DenseOptions options_;
   MeasurementNoise noise_;
@@ -75,6 +102,7 @@ class DenseMapper {
   std::map<SubmapId, TsdfVolume> maps_;
   std::size_t view_bytes_ = 0;
   int times_coarsened_ = 0;
+  Changes changes_;
 };
 
 }  // namespace roslam

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "roslam/common/export.hpp"
+#include "roslam/dense/occupancy_grid.hpp"
 #include "roslam/dense/surface_map.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "roslam/map/ids.hpp"
@@ -20,8 +21,6 @@ class CellBlock;
 struct DepthKeyframe;
 class DenseMapper;
 struct BlockKey;
-
-enum class OccupancyState { kUnknown, kFree, kOccupied };
 
 /// Occupied, free and unknown space for path planning: an octree in the world frame, written as OctoMap files
 /// (Hornung et al. 2013). Cells lie within 32768 cell sides of the world origin. Not thread-safe.

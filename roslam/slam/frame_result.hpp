@@ -49,6 +49,11 @@ enum class NoPose {
 /// In words, for messages and reports.
 ROSLAM_EXPORT std::string_view describe(NoPose reason);
 
+struct TrackedFrame;
+
+/// Why a tracked frame has no pose.
+NoPose reason_of(const TrackedFrame& frame);
+
 /// What became of a frame.
 struct ROSLAM_EXPORT FrameResult {
   std::size_t index = 0;                        ///< of the frame in its source

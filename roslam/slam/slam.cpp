@@ -113,6 +113,10 @@ SavedMap Slam::saved_map() const {
                       submaps_on_objects());
 }
 
+std::shared_ptr<const OccupancyGrid> Slam::occupancy() const {
+  return impl_->dense ? impl_->dense->occupancy() : nullptr;
+}
+
 std::optional<DenseMap> Slam::dense_map(const std::stop_token& stop) const {
   if (!impl_->dense) return std::nullopt;
   return impl_->dense->result(main_submap(), stop);

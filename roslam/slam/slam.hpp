@@ -15,6 +15,7 @@
 #include "roslam/common/export.hpp"
 #include "roslam/common/stage_times.hpp"
 #include "roslam/dense/dense_map.hpp"
+#include "roslam/dense/occupancy_grid.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/loop_closing/closed_loop.hpp"
@@ -37,10 +38,10 @@ using OnMapChanged = std::function<void(const MapChange&)>;
 /// The pipeline: frames in, trajectory and map out. open_slam() makes one with all its parts.
 ///
 /// Threads: process(), finish() and what configures are called from one thread. snapshot(), saved_map(),
-/// trajectory(), keyframes(), main_submap() and the other functions of submaps, loops(), lock_times() and
-/// cancel() may be called from any thread at any time, and hold the map for a millisecond or two at a time.
-/// All others give results of the thread that calls process(), map() and dense_map() only after finish() in
-/// real-time mode.
+/// trajectory(), occupancy(), keyframes(), main_submap() and the other functions of submaps, loops(),
+/// lock_times() and cancel() may be called from any thread at any time, and hold the map for a millisecond or
+/// two at a time. All others give results of the thread that calls process(), map() and dense_map() only
+/// after finish() in real-time mode.
 ///
 /// Callbacks are called on a thread of their own in real-time mode, and so cost the tracker nothing, however
 /// long they take: of more than 64 that wait the oldest are dropped and counted. In deterministic mode they
@@ -125,6 +126,11 @@ class ROSLAM_EXPORT Slam {
 
   /// A copy of the map, for save_map().
   SavedMap saved_map() const;
+
+  /// Free, occupied and unknown space around the path so far, for a planner; kept up from the first call on,
+  /// so that the first returns null, as all do where no dense map is made. OccupancyGrid::timestamp() says
+  /// how old it is. May be called from any thread.
+  std::shared_ptr<const OccupancyGrid> occupancy() const;
 
   /// The dense map of the main submap; nothing if none is made, or if stop was requested before it was
   /// extracted.

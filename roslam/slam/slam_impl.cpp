@@ -2,7 +2,6 @@
 #include "roslam/slam/slam_impl.hpp"
 
 #include <chrono>
-#include <exception>
 #include <utility>
 
 #include "roslam/common/stopwatch.hpp"
@@ -14,8 +13,6 @@ namespace roslam {
 namespace {
 // Keyframes that may wait for global bundle adjustment; while it runs no loop is detected.
 constexpr int kInterruptGlobalBundle = 20;
-constexpr const char* kTracking = "tracking";  // purpose of a lock of the map
-constexpr double kLabelsLast = 1.0;  // seconds that labels are carried to keyframes of the dense map
 
 const Camera& validated(const Camera& camera) {
   camera.validate();
@@ -33,28 +30,6 @@ Tracker::Settings settings_of_tracker(const Options& options, bool has_vocabular
   if (!options.keyframes.enabled || !options.loop.enabled || !has_vocabulary)
     settings.tracker.new_submap_after_lost = 0;
   return settings;
-}
-
-NoPose reason_of(const TrackedFrame& frame) {
-  if (frame.T_camera_world) return NoPose::kNone;
-  if (frame.state == TrackingState::kInitialising) return NoPose::kNoMap;
-  switch (frame.doubt) {
-    case PoseDoubt::kNone:
-      return NoPose::kNotRecognised;
-    case PoseDoubt::kFewInliers:
-    case PoseDoubt::kFewFound:
-      return NoPose::kFewLandmarks;
-    case PoseDoubt::kUncertain:
-      return NoPose::kUncertain;
-    case PoseDoubt::kPoorFit:
-      return NoPose::kPoorFit;
-    case PoseDoubt::kSpeed:
-    case PoseDoubt::kAcceleration:
-    case PoseDoubt::kTurnRate:
-    case PoseDoubt::kGyroscope:
-      return NoPose::kImplausible;
-  }
-  return NoPose::kNotRecognised;
 }
 }  // namespace
 
@@ -191,17 +166,6 @@ void Slam::Impl::withdraw(const Withdrawal& wrong, FrameResult& result) {
   front_end.forget_poses();
 }
 
-// Removes a keyframe whose pose was withdrawn. False if it is there and to be mapped.
-bool Slam::Impl::remove_withdrawn(KeyframeId keyframe) {
-  {
-    const MapLock lock(map_mutex, "removal of withdrawn keyframes");
-    if (!map.is_withdrawn(keyframe)) return map.find(keyframe) == nullptr;
-    map.remove_withdrawn(keyframe);
-  }
-  publish_poses(MapChangeKind::kWithdrawn);
-  return true;
-}
-
 void Slam::Impl::check_gyroscope(FrameResult& result) {
   const auto& gyroscope = tracker.gyroscope();
   if (warned_of_gyroscope || !gyroscope || gyroscope->agrees_with_images()) return;
@@ -262,67 +226,6 @@ void Slam::Impl::cull_contradicted(const TrackedFrame& tracked, const Frame& fra
                             {moving, frame.depth}, options.noise);
 }
 
-void Slam::Impl::map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,
-                              StageTimes& stage_times) {
-  if (remove_withdrawn(keyframe)) return;
-  mapper.process(keyframe, should_stop);
-  publish_poses(MapChangeKind::kKeyframe);
-  const LocalMapper::Times& t = mapper.times();
-  stage_times.add("mapping.landmarks", t.landmarks);
-  stage_times.add("mapping.fusion", t.fusion);
-  stage_times.add("mapping.bundle_adjustment", t.bundle);
-  stage_times.add("mapping.culling", t.culling);
-  stage_times.add("mapping", t.landmarks + t.fusion + t.bundle + t.culling);
-  if (loop_closer) closing.submit(keyframe);
-}
-
-// Tells restoration, the dense map and the program that keyframes have moved.
-void Slam::Impl::publish_poses(MapChangeKind kind) {
-  if (!needs_poses() && !on_map_changed) return;
-  MapLock lock(map_mutex, "publishing of poses");
-  if (needs_poses()) poses.publish(map);
-  if (!on_map_changed) return;
-  MapChange change = live.change(kind);
-  lock.unlock();
-  if (!change.moved.empty() || !change.removed.empty())
-    callbacks.post([this, change = std::move(change)] { on_map_changed(change); });
-}
-
-void Slam::Impl::close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,
-                             StageTimes& stage_times) {
-  const std::size_t closed = loop_closer->closed().size();
-  loop_closer->process(keyframe, should_stop, [this] { return closing.is_cancelled(); });
-  const LoopCloser::Times& t = loop_closer->times();
-  stage_times.add("loop.recognise", t.recognise);
-  if (loop_closer->closed().size() == closed) return;
-  publish_poses(MapChangeKind::kCorrection);
-  stage_times.add("loop.correct", t.correct);
-  stage_times.add("loop.fuse", t.fuse);
-  stage_times.add("loop.bundle_adjustment", t.bundle);
-}
-
-// Hands a keyframe to mapping, restoration and the dense map.
-void Slam::Impl::submit(KeyframeId keyframe, const Frame& frame, const DynamicObjects& objects) {
-  mapping.submit(keyframe);
-  if (dense) {
-    DenseInput input;
-    input.frame = frame;
-    input.dynamic_objects = objects;
-    if (const auto noise = front_end.noise().depth()) input.depth_noise = options.noise.at_least(*noise);
-    input.is_restored = restoration && options.dense.restore && options.dense.remove;
-    if (!front_end.labels().empty()) {
-      const MapLock lock(map_mutex, kTracking, true);
-      if (const auto T = log.T_frame_keyframe(map, front_end.labelled_index(), keyframe, kLabelsLast)) {
-        input.labels = front_end.labels();
-        input.has_older_labels = front_end.labelled_index() != frame.index;
-        input.T_labelled_camera = *T;
-      }
-    }
-    dense->submit(keyframe, std::move(input));
-  }
-  if (restoration) restoration->submit(keyframe, frame, objects);
-}
-
 void Slam::Impl::note_times(const FrontEndResult& observation, double total) {
   const Tracker::Times& t = tracker.times();
   if (front_end.detects()) times.add("tracking.removal", observation.detection_seconds);
@@ -332,35 +235,6 @@ void Slam::Impl::note_times(const FrontEndResult& observation, double total) {
   times.add("tracking.optimise", t.optimise);
   times.add("tracking.relocalise", t.relocalise);
   times.add("tracking", total);
-}
-
-void Slam::Impl::finish() {
-  load.release();
-  // All, whatever the first throws: no thread may change the map when results are read.
-  std::exception_ptr failure;
-  const auto drain = [&](auto& worker) {
-    try {
-      worker.drain();
-    } catch (...) {
-      if (!failure) failure = std::current_exception();
-    }
-  };
-  drain(mapping);
-  drain(closing);
-  if (restoration) drain(*restoration);
-  if (dense) drain(*dense);
-  callbacks.drain();
-  if (failure) std::rethrow_exception(failure);
-}
-
-void Slam::Impl::cancel() {
-  load.release();
-  front_end.cancel();
-  mapping.cancel();
-  closing.cancel();
-  if (restoration) restoration->cancel();
-  if (dense) dense->cancel();
-  callbacks.cancel();
 }
 
 }  // namespace roslam

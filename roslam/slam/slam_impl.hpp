@@ -32,6 +32,8 @@ namespace roslam {
 inline constexpr const char* kGyroscopeContradicts =
     "the images contradict the gyroscope, which is not used; check imu.T_camera_imu and its clock";
 
+inline constexpr const char* kTracking = "tracking";  // purpose of a lock of the map
+
 /// The parts of the pipeline and how they are joined.
 struct Slam::Impl {
   Impl(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,

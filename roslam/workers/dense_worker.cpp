@@ -14,6 +14,7 @@
 #include "roslam/common/thread_priority.hpp"
 #include "roslam/dense/dense_mapper.hpp"
 #include "roslam/dense/depth_keyframe.hpp"
+#include "roslam/dense/live_occupancy.hpp"
 #include "roslam/dense/occupancy_map.hpp"
 #include "roslam/geometry/se3f.hpp"
 #include "roslam/restoration/source_image.hpp"
@@ -48,6 +49,7 @@ struct DenseWorker::Impl {
   std::map<KeyframeId, KeyframePose> poses_of(const std::vector<KeyframeId>& ids) const;
   void follow(double share);
   void add_occupancy(SubmapId submap, DenseMap& map) const;
+  void keep_occupancy(StageTimes& times);
 
   DenseOptions options_;
   DepthOptions depth_;
@@ -62,9 +64,14 @@ struct DenseWorker::Impl {
   std::map<KeyframeId, std::vector<RemovedPoint>> removed_;
   std::size_t since_followed_ = 0;  // keyframes
   std::size_t moved_ = 0;
+  LiveOccupancy live_occupancy_;
+  KeyframeId newest_;              // that was fused
+  double newest_timestamp_ = 0.0;  // seconds
 
   std::mutex mutex_;  // guards what follows
   std::map<KeyframeId, DenseInput> unrestored_;
+  bool wants_occupancy_ = false;
+  std::shared_ptr<const OccupancyGrid> occupancy_;
 
   KeyframeJobs<Job> jobs_;
 
@@ -81,6 +88,7 @@ DenseWorker::Impl::Impl(const Camera& camera, const Options& options, Mode the_m
       load_(load),
       reducer_(camera, options.dense, options.depth),
       mapper_(options.dense, options.noise),
+      live_occupancy_(options.dense),
       jobs_(options.dense.queue),
       worker_([this](auto&&... job) { work(job...); }, the_mode, 1, KeyframeWorker::OnFailure::kSwitchOff) {}
 
@@ -124,10 +132,14 @@ void DenseWorker::Impl::work(KeyframeId keyframe, const KeyframeWorker::ShouldSt
     const Stopwatch watch;
     fuse(keyframe, *job);
     times.add("dense.fuse", watch.seconds());
-    if (++since_followed_ < static_cast<std::size_t>(options_.follow_every)) return;
-    const Stopwatch follow_watch;
-    follow(1.0);
-    times.add("dense.follow", follow_watch.seconds());
+    if (++since_followed_ >= static_cast<std::size_t>(options_.follow_every)) {
+      const Stopwatch follow_watch;
+      follow(1.0);
+      times.add("dense.follow", follow_watch.seconds());
+    }
+    newest_ = keyframe;
+    newest_timestamp_ = job->input.frame.timestamp;
+    keep_occupancy(times);
   } catch (const std::exception& error) {
     jobs_.note_fault(error);
   }
@@ -172,6 +184,20 @@ std::vector<DenseWorker::Impl::RemovedPoint> DenseWorker::Impl::removed_points(c
   return result;
 }
 
+// From when somebody has asked for it.
+void DenseWorker::Impl::keep_occupancy(StageTimes& times) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!wants_occupancy_) return;
+  }
+  const Stopwatch watch;
+  live_occupancy_.update(mapper_, mapper_.take_changes());
+  auto grid = live_occupancy_.grid(pose_lookup_({newest_}).front().submap, newest_timestamp_);
+  times.add("dense.occupancy", watch.seconds());
+  const std::scoped_lock lock(mutex_);
+  occupancy_ = std::move(grid);
+}
+
 std::map<KeyframeId, KeyframePose> DenseWorker::Impl::poses_of(const std::vector<KeyframeId>& ids) const {
   std::map<KeyframeId, KeyframePose> result;
   const std::vector<KeyframePose> poses = pose_lookup_(ids);
@@ -187,6 +213,12 @@ void DenseWorker::Impl::follow(double share) {
 void DenseWorker::drain() {
   impl_->worker_.drain();
   if (!impl_->worker_.is_cancelled()) impl_->follow(kInTheEnd);
+}
+
+std::shared_ptr<const OccupancyGrid> DenseWorker::occupancy() {
+  const std::scoped_lock lock(impl_->mutex_);
+  impl_->wants_occupancy_ = true;
+  return impl_->occupancy_;
 }
 
 void DenseWorker::cancel() { impl_->worker_.cancel(); }

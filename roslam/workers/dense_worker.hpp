@@ -8,6 +8,7 @@
 
 #include "roslam/common/stage_times.hpp"
 #include "roslam/dense/dense_map.hpp"
+#include "roslam/dense/occupancy_grid.hpp"
 #include "roslam/dynamic_objects/dynamic_objects.hpp"
 #include "roslam/map/ids.hpp"
 #include "roslam/map/keyframe_pose.hpp"
@@ -52,6 +53,10 @@ class DenseWorker {
 
   /// Discards the keyframes that wait.
   void cancel();
+
+  /// The occupancy of the submap of the keyframe that was fused last, kept up from the first call on; null
+  /// before the next keyframe. May be called from any thread.
+  std::shared_ptr<const OccupancyGrid> occupancy();
 
   /// The map as it is. Only after drain(). Nothing if a stop was requested before it was extracted.
   std::optional<DenseMap> result(SubmapId submap, const std::stop_token& stop = {}) const;

@@ -17,6 +17,7 @@ void DenseWorker::submit(KeyframeId, DenseInput) {}
 void DenseWorker::restored(KeyframeId, const RestoredImage*) {}
 void DenseWorker::drain() {}
 void DenseWorker::cancel() {}
+std::shared_ptr<const OccupancyGrid> DenseWorker::occupancy() { return nullptr; }
 std::optional<DenseMap> DenseWorker::result(SubmapId, const std::stop_token&) const { return std::nullopt; }
 StageTimes DenseWorker::times() const { return {}; }
 
