@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "evaluation/trajectory_plot.hpp"
@@ -177,30 +178,39 @@ void RunFolder::write_flight(const Slam& slam) const {
 }
 
 void RunFolder::write(const Slam& slam, const RunResults& summary, const FrameSource& source,
-                      const RunDescription& description) const {
+                      const RunDescription& description, const std::function<bool()>& is_urgent) const {
   const Trajectory trajectory = slam.trajectory();
   const bool has_occupancy = summary.dense && summary.dense->occupancy;
-  write_all({
-      {"run.json",
-       [&](const Path& file) { write_file(file, run_report(slam, summary, source, description)); }},
-      {"groundtruth.txt", [&](const Path& file) { write_trajectory(file, summary.truth); },
-       if_any(!summary.truth.empty(), Result::kRemoved)},
-      {"trajectory.png",
-       [&](const Path& file) { write_png(file, plot_trajectory(trajectory, "RO-SLAM", WorldUp::kZ)); },
-       if_any(!trajectory.empty(), Result::kRemoved)},
-      {"map.ply", [&](const Path& file) { write_map_ply(file, slam.map(), slam.main_submap()); }},
-      {"dense.ply", [&](const Path& file) { write_surface_ply(file, summary.dense->surface, true); },
-       if_any(summary.dense.has_value(), Result::kRemoved)},
-      {"dense.bt", [&](const Path& file) { summary.dense->occupancy->write(file); },
-       if_any(has_occupancy, Result::kRemoved)},
-      {"report.html",
-       [&](const Path& file) { replace_file(file, run_page(slam, summary, source, description, path_)); }},
-  });
+  const auto is_essential = [](const Output& output) {
+    return std::string_view(output.file) == "run.json" || std::string_view(output.file) == "groundtruth.txt";
+  };
+  write_all(
+      {
+          {"run.json",
+           [&](const Path& file) { write_file(file, run_report(slam, summary, source, description)); }},
+          {"groundtruth.txt", [&](const Path& file) { write_trajectory(file, summary.truth); },
+           if_any(!summary.truth.empty(), Result::kRemoved)},
+          {"trajectory.png",
+           [&](const Path& file) { write_png(file, plot_trajectory(trajectory, "RO-SLAM", WorldUp::kZ)); },
+           if_any(!trajectory.empty(), Result::kRemoved)},
+          {"map.ply", [&](const Path& file) { write_map_ply(file, slam.map(), slam.main_submap()); }},
+          {"dense.ply", [&](const Path& file) { write_surface_ply(file, summary.dense->surface, true); },
+           if_any(summary.dense.has_value(), Result::kRemoved)},
+          {"dense.bt", [&](const Path& file) { summary.dense->occupancy->write(file); },
+           if_any(has_occupancy, Result::kRemoved)},
+          {"report.html",
+           [&](const Path& file) {
+             replace_file(file, run_page(slam, summary, source, description, path_));
+           }},
+      },
+      [&](const Output& output) { return !is_essential(output) && is_urgent && is_urgent(); });
 }
 
-void RunFolder::write_all(const std::vector<Output>& outputs) const {
+void RunFolder::write_all(const std::vector<Output>& outputs,
+                          const std::function<bool(const Output&)>& is_left_out) const {
   std::exception_ptr first_failure;
   for (const auto& output : outputs) {
+    if (is_left_out && is_left_out(output)) continue;
     try {
       write_one(output, path_ / output.file);
     } catch (const OutputError&) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -81,9 +82,10 @@ class RunFolder {
   void write_flight(const Slam& slam) const;
 
   /// Writes all other results, also of a run that was interrupted or failed. Continues after a file that
-  /// cannot be written and throws the first failure as OutputError at the end.
+  /// cannot be written and throws the first failure as OutputError at the end. is_urgent: polled between
+  /// files; once true, only run.json and groundtruth.txt are written.
   void write(const Slam& slam, const RunResults& summary, const FrameSource& source,
-             const RunDescription& description) const;
+             const RunDescription& description, const std::function<bool()>& is_urgent = {}) const;
 
   const std::filesystem::path& path() const { return path_; }
 
@@ -92,7 +94,8 @@ class RunFolder {
   struct Output;
   static Result if_any(bool is_any, Result otherwise);
   static void write_one(const Output& output, const std::filesystem::path& file);
-  void write_all(const std::vector<Output>& outputs) const;
+  void write_all(const std::vector<Output>& outputs,
+                 const std::function<bool(const Output&)>& is_left_out = {}) const;
 
   std::filesystem::path path_;
   FolderLock lock_;

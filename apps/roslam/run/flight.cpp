@@ -188,7 +188,10 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   if (flight.slam->restores()) attempt([&] { end_restoration(flight, *restorations, folder); });
   if (log) flight.summary.removal = log->tally();
   attempt([&] { flight.summary.dense = flight.slam->dense_map(urgent_stop); });
-  attempt([&] { folder.write(*flight.slam, flight.summary, *flight.source, flight.description); });
+  attempt([&] {
+    folder.write(*flight.slam, flight.summary, *flight.source, flight.description,
+                 [&] { return urgent_stop.stop_requested(); });
+  });
   if (failure) std::rethrow_exception(failure);
   if (flight.summary.failure) std::rethrow_exception(flight.summary.failure);
   require_poses(*flight.slam, flight.summary, *flight.source, arguments.source.name);

@@ -120,7 +120,7 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "  run.json                     options, counts, processor times, memory\n"
       "Ctrl-C ends the run early and writes the results so far (\"interrupted\" in run.json); a second one "
       "leaves out\n"
-      "the dense map, a third ends the program at once.\n"
+      "the dense map, the report and images, a third ends the program at once.\n"
       "Results of an earlier run in RUN are moved to RUN/previous/.\n"
       "Exit code: 0 success, 1 an error in the input, 2 wrong usage, 3 with --strict: results are written, "
       "but not\n"
