@@ -68,8 +68,8 @@ int main(int argc, char** argv) try {
     return 2;
   }
   roslam::TumSource source(argv[1], roslam::load_camera(argv[2]));
+  NewestPose newest;  // before slam, whose callbacks use it to the end
   const auto slam = roslam::open_slam(source.camera(), {}, roslam::Mode::kRealTime);
-  NewestPose newest;
   slam->on_frame([&](const roslam::FrameResult& result) { newest.set(result); });
   std::jthread controller([&](const std::stop_token& stop) {
     PositionHold hold;

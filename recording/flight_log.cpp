@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "roslam/common/error.hpp"
-#include "roslam/common/failure.hpp"
 #include "roslam/common/thread_priority.hpp"
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/map_io/map_file.hpp"
@@ -22,6 +21,7 @@ using Clock = std::chrono::steady_clock;
 constexpr const char* kOdometry = "odometry.csv";
 constexpr auto kFlush = std::chrono::milliseconds(500);
 constexpr auto kPathInterval = std::chrono::seconds(5);  // between two versions of the whole path
+constexpr std::size_t kMostPoses = 100000;               // that may wait for the disk
 constexpr std::size_t kMostWaiting = 8U << 20U;          // bytes of lines that may wait for the disk
 
 void append(std::string& line, double value, std::chars_format format, int precision) {
@@ -115,8 +115,8 @@ void FlightLog::add(const FrameResult& result) {
   if (!submap_) submap_ = result.submap;
   if (result.submap != *submap_) {
     is_path_old_ = true;
-  } else if (trajectory_lines_.size() < kMostWaiting) {
-    trajectory_lines_ += trajectory_line({result.timestamp, *result.T_world_camera});
+  } else if (poses_.size() < kMostPoses) {
+    poses_.push_back({result.timestamp, *result.T_world_camera});
   }
 }
 
@@ -141,7 +141,7 @@ void FlightLog::work(const std::stop_token& stop) {
       path_due = Clock::now() + kPathInterval;
     }
     if (now >= map_due) {
-      if (settings_.saves_map) attempt([&] { save_map(settings_.folder / "map.roslam", slam_.saved_map()); });
+      if (settings_.saves_map) attempt([&] { save_map_file(); });
       map_due = Clock::now() + checkpoint;
     }
   }
@@ -149,33 +149,45 @@ void FlightLog::work(const std::stop_token& stop) {
 
 // Lines that the disk does not take wait for the next time.
 void FlightLog::append() {
-  std::string odometry, path;
+  std::string odometry;
+  Trajectory poses;
   {
     const std::scoped_lock lock(mutex_);
     odometry.swap(odometry_lines_);
-    path.swap(trajectory_lines_);
+    poses.swap(poses_);
   }
+  std::string path;
+  for (const StampedPose& pose : poses) path += trajectory_line(pose);
   const bool has_odometry = odometry.empty() || (odometry_ && odometry_->append(odometry));
   const bool has_path = path.empty() || !trajectory_ || trajectory_->append(path);
   if (has_odometry && has_path) return;
   const std::scoped_lock lock(mutex_);
   if (!has_odometry) odometry_lines_.insert(0, odometry);
-  if (!has_path) trajectory_lines_.insert(0, path);
+  if (!has_path) poses_.insert(poses_.begin(), poses.begin(), poses.end());
 }
 
-// All poses as the map has them now. What is added meanwhile is appended to the new file.
+// All poses as the map has them now. What was added until then is among them; what is added later is
+// appended.
 void FlightLog::save_path() {
   {
     const std::scoped_lock lock(mutex_);
-    trajectory_lines_.clear();
     is_path_old_ = false;
   }
   const SubmapId submap = slam_.main_submap();
+  const Trajectory path = slam_.trajectory();
   std::string content = trajectory_header();
-  for (const StampedPose& pose : slam_.trajectory()) content += trajectory_line(pose);
-  if (trajectory_) trajectory_->replace(content);
+  for (const StampedPose& pose : path) content += trajectory_line(pose);
+  try {
+    if (trajectory_) trajectory_->replace(content);
+  } catch (...) {
+    const std::scoped_lock lock(mutex_);
+    is_path_old_ = true;
+    throw;
+  }
   const std::scoped_lock lock(mutex_);
   submap_ = submap;
+  if (!path.empty())
+    std::erase_if(poses_, [&](const StampedPose& pose) { return pose.timestamp <= path.back().timestamp; });
 }
 
 // The map is copied at normal priority, as a thread that is preempted while it holds the map would keep the

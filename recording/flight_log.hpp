@@ -64,7 +64,7 @@ class FlightLog {
   mutable std::mutex mutex_;
   std::condition_variable_any tick_;
   std::string odometry_lines_;      // not yet written
-  std::string trajectory_lines_;    // likewise
+  Trajectory poses_;                // likewise, of trajectory.txt
   std::optional<SubmapId> submap_;  // that trajectory.txt is of
   bool is_path_old_ = false;        // poses in it were withdrawn, or are of another submap
   std::map<std::string, std::size_t> faults_;

@@ -130,6 +130,27 @@ TEST(MotionFilter, FollowsASuddenAcceleration) {
   }
 }
 
+// The same roll at any heading: the rate is in the body frame, the rotation in odom.
+TEST(MotionFilter, TurnsAlikeAtAnyHeading) {
+  for (const double yaw : {0.0, 1.5708, 3.1416, -2.0}) {
+    MotionFilter filter;
+    const Matrix6d noise = 1e-7 * Matrix6d::Identity();
+    const Eigen::Quaterniond heading(Eigen::AngleAxisd(yaw, Vector3d::UnitZ()));
+    const auto pose = [&](double t) {
+      return SE3(heading * so3_exp({2.5 * std::max(t - 1.0, 0.0) * std::max(t - 1.0, 0.0), 0, 0}),
+                 Vector3d::Zero());
+    };
+    filter.start(0.0, pose(0.0), noise);
+    for (int i = 1; i * kStep < 1.2; ++i) {
+      filter.predict(i * kStep);
+      filter.update(pose(i * kStep), noise);
+    }
+    const double expected = 5.0 * (35 * kStep - 1.0);  // rad/s
+    EXPECT_NEAR(filter.state().turn_rate.x(), expected, 0.15) << yaw;
+    EXPECT_LT(filter.state().turn_rate.tail<2>().norm(), 0.02) << yaw;
+  }
+}
+
 // As where the landmarks in view change at once.
 TEST(MotionFilter, TakesNoJumpForAMotion) {
   MotionFilter filter;

@@ -60,8 +60,12 @@ class MadeUpFlight : public testing::Test {
   std::optional<Odometry> feed(int first, int end, const SE3& T_map_world = {}) {
     std::optional<Odometry> last;
     for (int i = first; i < end; ++i)
-      last = estimator_.add(tracked(i, i > 0 ? std::make_optional(i - 1) : std::nullopt, T_map_world));
+      last = add(tracked(i, i > 0 ? std::make_optional(i - 1) : std::nullopt, T_map_world));
     return last;
+  }
+
+  std::optional<Odometry> add(const TrackedFrame& frame, SubmapId submap = SubmapId{0}) {
+    return estimator_.add(frame, submap);
   }
 
   static void expect_near(const SE3& a, const SE3& b, double tolerance) {
@@ -88,7 +92,7 @@ TEST_F(MadeUpFlight, IsThatOfTheBody) {
 TEST_F(MadeUpFlight, GoesOnWhereTheMapIsCorrected) {
   const auto before = feed(0, 60);
   const SE3 correction(so3_exp({0.01, -0.02, 0.1}), {1.0, -0.5, 0.2});
-  const auto after = estimator_.add(tracked(60, 59, correction));
+  const auto after = add(tracked(60, 59, correction));
   ASSERT_TRUE(before && after);
   const SE3 step = before->T_odom_body.inverse() * after->T_odom_body;
   expect_near(step, T_world_body(59 * kStep).inverse() * T_world_body(60 * kStep), 0.005);
@@ -97,10 +101,26 @@ TEST_F(MadeUpFlight, GoesOnWhereTheMapIsCorrected) {
   EXPECT_GT((after->covariance.topLeftCorner<3, 3>().trace()), 0.9) << "odom was off by that metre";
 }
 
+TEST_F(MadeUpFlight, AnotherWorldFrameIsNoErrorOfOdom) {
+  const auto before = feed(0, 60);
+  const SE3 level(so3_exp({0.1, 0, 0}), Vector3d::Zero());
+  estimator_.world_changed(level);
+  const auto levelled = add(tracked(60, 59, level));
+  ASSERT_TRUE(before && levelled);
+  EXPECT_LT(levelled->covariance.trace(), 2.0 * before->covariance.trace());
+  const SE3 merged(so3_exp({0, 0, 3.0}), {50, 20, 0});
+  const auto elsewhere = add(tracked(61, 60, merged), SubmapId{1});
+  ASSERT_TRUE(elsewhere);
+  EXPECT_LT(elsewhere->covariance.trace(), 2.0 * before->covariance.trace());
+  EXPECT_EQ(elsewhere->resets, 0U);
+  expect_near(elsewhere->T_odom_body, T_world_body(61 * kStep), 0.005);
+  expect_near(elsewhere->T_map_odom, merged, 1e-6);
+}
+
 TEST_F(MadeUpFlight, StartsAnewAfterALoss) {
   feed(0, 60);
-  for (int i = 60; i < 70; ++i) EXPECT_FALSE(estimator_.add(without_pose(i, TrackingState::kRecentlyLost)));
-  const auto found = estimator_.add(tracked(70, 59));
+  for (int i = 60; i < 70; ++i) EXPECT_FALSE(add(without_pose(i, TrackingState::kRecentlyLost)));
+  const auto found = add(tracked(70, 59));
   ASSERT_TRUE(found);
   EXPECT_EQ(found->resets, 1U);
   expect_near(found->T_odom_body, T_world_body(70 * kStep), 0.01);
@@ -112,8 +132,8 @@ TEST_F(MadeUpFlight, APoorFitIsWithheldAndNoLoss) {
   TrackedFrame poor = tracked(60, 59);
   poor.state = TrackingState::kRecentlyLost;
   poor.T_camera_world.reset();
-  EXPECT_FALSE(estimator_.add(poor));
-  const auto next = estimator_.add(tracked(61, 60));
+  EXPECT_FALSE(add(poor));
+  const auto next = add(tracked(61, 60));
   ASSERT_TRUE(next);
   EXPECT_EQ(next->resets, 0U);
   expect_near(next->T_odom_body, T_world_body(61 * kStep), 0.01);
@@ -121,11 +141,11 @@ TEST_F(MadeUpFlight, APoorFitIsWithheldAndNoLoss) {
 
 TEST_F(MadeUpFlight, ANewSubmapBeginsWhereTheLastPoseWas) {
   const auto last = feed(0, 60);
-  estimator_.add(without_pose(60, TrackingState::kLost));
+  add(without_pose(60, TrackingState::kLost));
   TrackedFrame first = tracked(90, std::nullopt);
   first.T_camera_world =
       (SE3(so3_exp({0.1, 0, 0}), Vector3d::Zero()) * mount_).inverse();  // rolled, in its origin
-  const auto odometry = estimator_.add(first);
+  const auto odometry = add(first);
   ASSERT_TRUE(last && odometry);
   EXPECT_EQ(odometry->resets, 1U);
   EXPECT_LT((odometry->T_odom_body.translation() - last->T_odom_body.translation()).norm(), 0.01);
@@ -142,8 +162,8 @@ TEST_F(MadeUpFlight, WithdrawnPosesAreTakenBack) {
   TrackedFrame wrong = tracked(60, 59);
   wrong.motion->T_camera_since =
       SE3(Eigen::Quaterniond::Identity(), {0.3, 0, 0}) * wrong.motion->T_camera_since;
-  estimator_.add(wrong);
-  const auto right = estimator_.add(tracked(61, 59));
+  add(wrong);
+  const auto right = add(tracked(61, 59));
   ASSERT_TRUE(right);
   EXPECT_EQ(right->resets, 1U);
   expect_near(right->T_odom_body, T_world_body(61 * kStep), 0.01);
@@ -153,14 +173,14 @@ TEST_F(MadeUpFlight, PredictedPosesAreLessAndLessCertain) {
   double before = feed(0, 60)->covariance.trace();
   for (int i = 60; i < 80; ++i) {
     TrackedFrame hidden = without_pose(i, TrackingState::kPredicted);
-    const auto odometry = estimator_.add(hidden);
+    const auto odometry = add(hidden);
     ASSERT_TRUE(odometry);
     EXPECT_TRUE(odometry->is_predicted);
     EXPECT_EQ(odometry->quality, 0.0);
     EXPECT_GT(odometry->covariance.trace(), before);
     before = odometry->covariance.trace();
   }
-  const auto seen = estimator_.add(tracked(80, 59));
+  const auto seen = add(tracked(80, 59));
   ASSERT_TRUE(seen);
   EXPECT_LT(seen->covariance.trace(), before);
   EXPECT_EQ(seen->resets, 0U);
@@ -172,7 +192,7 @@ TEST_F(MadeUpFlight, AResetOfTheClockIsToldAsSuch) {
   TrackedFrame frame = tracked(60, 59);
   frame.timestamp = 5.0 + kStep;
   frame.motion->since = 5.0;
-  const auto odometry = estimator_.add(frame);
+  const auto odometry = add(frame);
   ASSERT_TRUE(odometry);
   EXPECT_EQ(odometry->resets, 1U);
   expect_near(odometry->T_odom_body, T_world_body(60 * kStep), 0.01);

@@ -140,6 +140,7 @@ void DenseMapper::limit_memory() {
 }
 
 DenseChanges DenseMapper::take_changes() {
+  if (voxel_size_ == 0.0) return {};  // nothing was fused yet
   const Changes taken = std::exchange(changes_, {});
   changes_.are_kept = true;
   if (!taken.are_kept) return all();
@@ -147,9 +148,9 @@ DenseChanges DenseMapper::take_changes() {
   result.blocks = taken.blocks;
   for (const auto& [id, before] : taken.before) {
     if (const auto fused = fused_.find(id); fused != fused_.end()) {
-      result.keyframes.push_back({unpack(fused->second.keyframe), before, fused->second.pose});
+      result.keyframes.push_back({id, before, fused->second.pose, {}});
     } else if (const auto gone = taken.gone.find(id); gone != taken.gone.end() && before.submap.is_valid()) {
-      result.keyframes.push_back({unpack(gone->second.keyframe), before, {}});
+      result.keyframes.push_back({id, before, {}, gone->second.keyframe});
     }
   }
   return result;
@@ -158,7 +159,7 @@ DenseChanges DenseMapper::take_changes() {
 DenseChanges DenseMapper::all() const {
   DenseChanges result;
   result.is_all = true;
-  for (const auto& [id, fused] : fused_) result.keyframes.push_back({unpack(fused.keyframe), {}, fused.pose});
+  for (const auto& [id, fused] : fused_) result.keyframes.push_back({id, {}, fused.pose, {}});
   for (const auto& [submap, map] : maps_) {
     for (const BlockKey& key : map.keys()) result.blocks[submap].insert(key);
   }

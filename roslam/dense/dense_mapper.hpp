@@ -20,8 +20,9 @@ namespace roslam {
 /// How a dense map changed.
 struct DenseChanges {
   struct Moved {
-    DepthKeyframe keyframe;
-    KeyframePose before, now;  ///< without a submap: it was not in, or is not any more
+    KeyframeId id;
+    KeyframePose before, now;                 ///< without a submap: it was not in, or is not any more
+    std::optional<PackedDepthKeyframe> gone;  ///< the keyframe, if the map does not have it any more
   };
   std::vector<Moved> keyframes;
   std::map<SubmapId, BlockSet> blocks;  ///< of voxels
@@ -64,6 +65,11 @@ class DenseMapper {
   /// What changed since the last call; all, in the first and after the voxels became larger. Costs the mapper
   /// time from the first call on.
   DenseChanges take_changes();
+
+  /// A keyframe of such changes, before the next change of the map.
+  DepthKeyframe keyframe(const DenseChanges::Moved& moved) const {
+    return unpack(moved.gone ? *moved.gone : fused_.at(moved.id).keyframe);
+  }
 
   /// Makes the next call give all.
   void restart_changes() { changes_ = {}; }

@@ -25,11 +25,12 @@ void LiveOccupancy::update(const DenseMapper& mapper, const DenseChanges& change
     resolution_ = usual_resolution(mapper.voxel_size());
     spaces_.clear();
   }
-  for (const auto& keyframe : changes.keyframes) {
-    if (keyframe.before.submap.is_valid())
-      see_through(spaces_[keyframe.before.submap], keyframe.keyframe, keyframe.before.T_world_camera, -1);
-    if (keyframe.now.submap.is_valid())
-      see_through(spaces_[keyframe.now.submap], keyframe.keyframe, keyframe.now.T_world_camera, 1);
+  for (const auto& moved : changes.keyframes) {
+    const DepthKeyframe keyframe = mapper.keyframe(moved);  // one at a time, as they are large
+    if (moved.before.submap.is_valid())
+      see_through(spaces_[moved.before.submap], keyframe, moved.before.T_world_camera, -1);
+    if (moved.now.submap.is_valid())
+      see_through(spaces_[moved.now.submap], keyframe, moved.now.T_world_camera, 1);
   }
   for (const auto& [submap, blocks] : changes.blocks) {
     for (const BlockKey& key : blocks) find_surfaces(spaces_[submap], mapper.map(submap), key);

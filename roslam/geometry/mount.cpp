@@ -21,13 +21,12 @@ SE3 forward_camera() {
 SE3 mounted_camera(const std::array<double, 6>& mount) {
   constexpr double kFar = 10.0;  // metres; more is a wrong unit
   constexpr double kTurn = 360.0;
-  const bool is_near =
-      std::all_of(mount.begin(), mount.begin() + 3, [](double v) { return std::abs(v) <= kFar; });
+  const bool is_near = std::hypot(mount[0], mount[1], mount[2]) <= kFar;
   const bool is_turn =
       std::all_of(mount.begin() + 3, mount.end(), [](double v) { return std::abs(v) <= kTurn; });
   if (!is_near || !is_turn)
     throw CalibrationError(
-        "mount of the camera: x, y, z must be -10 to 10 m, roll, pitch, yaw -360 to 360 degrees");
+        "mount of the camera: it must be within 10 m, roll, pitch, yaw -360 to 360 degrees");
   const auto about = [](double degrees, const Eigen::Vector3d& axis) {
     return Eigen::AngleAxisd(degrees * std::numbers::pi / 180.0, axis);
   };

@@ -45,8 +45,10 @@ void LocalMapper::process(KeyframeId keyframe, const std::function<bool()>& shou
   }
   {
     const Stopwatch watch;
-    landmark_culler_.watch(landmarks_from_triangulation(map_, map_mutex_, keyframe, camera_, settings_.noise,
-                                                        settings_.matcher, settings_.landmarks));
+    const auto created = landmarks_from_triangulation(map_, map_mutex_, keyframe, camera_, settings_.noise,
+                                                      settings_.matcher, settings_.landmarks);
+    const MapLock lock(map_mutex_, "new landmarks");  // which guards the culler as well
+    landmark_culler_.watch(created);
     times_.landmarks += watch.seconds();
   }
   {

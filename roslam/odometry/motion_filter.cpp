@@ -17,14 +17,14 @@ constexpr std::array kLinear{0.02, 0.3, 1.5};    // m^2/s^3
 constexpr std::array kAngular{0.02, 0.7, 20.0};  // rad^2/s^3
 constexpr double kStays = 0.95;                  // probability that a model holds from one pose to the next
 
-// Adds the covariance of white acceleration over a time to the blocks of what is integrated and of its rate.
-void add_noise(Matrix12d& covariance, int at, double density, double dt) {
-  for (int k = at; k < at + 3; ++k) {
-    covariance(k, k) += density * dt * dt * dt / 3.0;
-    covariance(k, k + 6) += density * dt * dt / 2.0;
-    covariance(k + 6, k) += density * dt * dt / 2.0;
-    covariance(k + 6, k + 6) += density * dt;
-  }
+// Adds the covariance of white acceleration over a time to the blocks of a rate and of what is integrated. R:
+// from the frame of the rate to that of the integral.
+void add_noise(Matrix12d& covariance, int at, double density, double dt, const Eigen::Matrix3d& R) {
+  const Eigen::Matrix3d cross = density * dt * dt / 2.0 * R;
+  covariance.block<3, 3>(at, at).diagonal().array() += density * dt * dt * dt / 3.0;
+  covariance.block<3, 3>(at, at + 6) += cross;
+  covariance.block<3, 3>(at + 6, at) += cross.transpose();
+  covariance.block<3, 3>(at + 6, at + 6).diagonal().array() += density * dt;
 }
 
 // The error of one state against another, in the coordinates of the covariance.
@@ -131,8 +131,8 @@ void MotionFilter::predict(Model& model, std::size_t index, double dt) {
   model.before = s.covariance.topLeftCorner<6, 6>();
   model.cross = s.covariance.topRows<6>() * F.transpose();
   s.covariance = (F * s.covariance * F.transpose()).eval();
-  add_noise(s.covariance, 0, kLinear[index], dt);
-  add_noise(s.covariance, 3, kAngular[index], dt);
+  add_noise(s.covariance, 0, kLinear[index], dt, Eigen::Matrix3d::Identity());
+  add_noise(s.covariance, 3, kAngular[index], dt, R);
   s.T_odom_body =
       SE3(s.T_odom_body.rotation() * so3_exp(turn), s.T_odom_body.translation() + s.velocity * dt);
 }

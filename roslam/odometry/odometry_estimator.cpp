@@ -21,12 +21,12 @@ Matrix6d covariance_in_odom(const Matrix6d& by_camera, const SE3& T_body_camera,
 }
 }  // namespace
 
-std::optional<Odometry> OdometryEstimator::add(const TrackedFrame& frame) {
+std::optional<Odometry> OdometryEstimator::add(const TrackedFrame& frame, SubmapId submap) {
   const bool is_tracked = frame.state == TrackingState::kTracking;
   const bool is_placed =
       is_tracked || frame.motion;  // a poor fit is withheld, but what follows is measured from it
   if (is_placed) {
-    place(frame);
+    place(frame, submap);
     if (is_tracked) {
       filter(frame);
       return output(frame, false);
@@ -42,7 +42,7 @@ std::optional<Odometry> OdometryEstimator::add(const TrackedFrame& frame) {
 }
 
 // Where the frame is in odom, by its motion since an earlier one.
-void OdometryEstimator::place(const TrackedFrame& frame) {
+void OdometryEstimator::place(const TrackedFrame& frame, SubmapId submap) {
   const bool is_first = placed_.empty();
   const std::size_t before = placed_.size();
   while (frame.motion && !placed_.empty() && placed_.back().timestamp > frame.motion->since)
@@ -64,7 +64,10 @@ void OdometryEstimator::place(const TrackedFrame& frame) {
   }
   placed_.push_back({frame.timestamp, T_odom_camera});
   while (frame.timestamp - placed_.front().timestamp > kKept && placed_.size() > 1) placed_.pop_front();
-  if (frame.T_camera_world) T_map_odom_ = frame.T_camera_world->inverse() * T_odom_camera.inverse();
+  if (!frame.T_camera_world) return;
+  T_map_odom_ = frame.T_camera_world->inverse() * T_odom_camera.inverse();
+  if (submap != submap_) T_map_odom_at_start_ = T_map_odom_;  // submaps were merged: another world
+  submap_ = submap;
 }
 
 // The pose of a frame whose connection with those before is not known: at the last position, with the last

@@ -17,8 +17,11 @@ class OdometryEstimator {
  public:
   explicit OdometryEstimator(const SE3& T_body_camera) : T_body_camera_(T_body_camera) {}
 
-  /// What became of the next frame. Nothing if it has no pose.
-  std::optional<Odometry> add(const TrackedFrame& frame);
+  /// What became of the next frame. submap: that it was tracked in. Nothing if it has no pose.
+  std::optional<Odometry> add(const TrackedFrame& frame, SubmapId submap);
+
+  /// To be called when the world frame of the submap was turned or moved: that is no error of odom.
+  void world_changed(const SE3& T_new_old) { T_map_odom_at_start_ = T_new_old * T_map_odom_at_start_; }
 
   /// To be called when the source's clock was reset to that time (seconds), as Tracker::restart_clock.
   void restart_clock(double timestamp);
@@ -29,7 +32,7 @@ class OdometryEstimator {
     SE3 T_odom_camera;
   };
 
-  void place(const TrackedFrame& frame);
+  void place(const TrackedFrame& frame, SubmapId submap);
   SE3 beside_last(const TrackedFrame& frame) const;
   void filter(const TrackedFrame& frame);
   Odometry output(const TrackedFrame& frame, bool is_predicted);
@@ -38,7 +41,8 @@ class OdometryEstimator {
   MotionFilter filter_;
   std::deque<Placed> placed_;  // of the last seconds, oldest first
   SE3 T_map_odom_;
-  SE3 T_map_odom_at_start_;            // as it was at the last reset
+  SE3 T_map_odom_at_start_;  // as it was at the last reset, or when the submap became another one
+  SubmapId submap_;
   Matrix6d drift_ = Matrix6d::Zero();  // covariance of what all poses at this time have in common, in odom
   std::size_t resets_ = 0;
   bool is_interrupted_ = false;  // since the last pose

@@ -21,7 +21,6 @@ class WorldLevel {
 
   /// The pose that the first submap begins with, in place of a level one in the origin.
   void set_initial_pose(const SE3& T_world_body) { initial_T_world_body_ = T_world_body; }
-  bool has_initial_pose() const { return initial_T_world_body_.has_value(); }
 
   void add_inertial(std::span<const InertialSample> samples);
 

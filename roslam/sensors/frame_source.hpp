@@ -43,8 +43,8 @@ class ROSLAM_EXPORT FrameSource {
   /// The next frame, or nothing at the end. Timestamps strictly increase, unless the clock restarts.
   virtual std::optional<Frame> next() = 0;
 
-  /// Makes a waiting next() return nothing within 200 ms, such as when a camera has stalled. Safe from any
-  /// thread.
+  /// Makes a next() that waits, or is about to, return nothing within 200 ms, such as when a camera has
+  /// stalled. Safe from any thread.
   virtual void interrupt() {}
 
   /// The next frame, or nothing at the end or soon after a stop was requested.

@@ -53,13 +53,14 @@ void GravityEstimator::track(const TrackedImu& pose) {
   last_ = pose;
 }
 
-// Each sample stands for the time since the one before, the last one for the rest as well.
+// Each sample stands for the time since the one before, the last one for the rest as well, within limits.
 void GravityEstimator::integrate(const TrackedImu& until) {
-  constexpr double kMaxRest = 0.02;  // seconds
+  constexpr double kMaxRest = 0.02;  // seconds that a sample stands for
   const double begin = last_->timestamp;
   const double duration = until.timestamp - begin;
   double reached = begin;
   const auto add = [&](const InertialSample& sample, double time) {
+    reached = std::max(reached, time - kMaxRest);  // nothing stands for what is missing
     const double middle = (0.5 * (reached + time) - begin) / duration;
     force_ += last_->R_world_imu.slerp(middle, until.R_world_imu) * sample.acceleration * (time - reached);
     integrated_ += time - reached;

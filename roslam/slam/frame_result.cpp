@@ -36,7 +36,7 @@ std::string_view describe(NoPose reason) {
     case NoPose::kNone:
       return "pose known";
     case NoPose::kNoMap:
-      return "no map yet: too few points of known depth, or movable objects fill the image";
+      return "no map yet: too few points of known depth or movable objects fill the image";
     case NoPose::kNotRecognised:
       return "the map does not show what the image shows";
     case NoPose::kFewLandmarks:
@@ -44,7 +44,7 @@ std::string_view describe(NoPose reason) {
     case NoPose::kUncertain:
       return "what is in view does not constrain the pose";
     case NoPose::kPoorFit:
-      return "matches are off by much, as in a blurred image";
+      return "matches are off by much as in a blurred image";
     case NoPose::kImplausible:
       return "the motion is not plausible";
   }

@@ -38,16 +38,23 @@ std::shared_ptr<const MapSnapshot> LiveMap::snapshot() {
   constexpr auto kFresh = std::chrono::milliseconds(100);
   const std::scoped_lock lock(snapshot_mutex_);
   if (snapshot_ && std::chrono::steady_clock::now() - taken_ < kFresh) return snapshot_;
-  auto next = std::make_shared<MapSnapshot>();
-  {
+  // Parts before and after a correction of the whole map do not fit together.
+  constexpr int kTries = 3;
+  std::shared_ptr<MapSnapshot> next;
+  for (int i = 0; i < kTries; ++i) {
+    next = std::make_shared<MapSnapshot>();
+    {
+      const MapLock map_lock(mutex_, kPurpose);
+      next->frames = log_.frames();
+      next->corrections = map_.corrections();
+      next->main_submap = log_.main_submap(map_);
+    }
+    copy_keyframes(*next);
+    copy_landmarks(*next);
+    next->path = path(next->main_submap);
     const MapLock map_lock(mutex_, kPurpose);
-    next->frames = log_.frames();
-    next->corrections = map_.corrections();
-    next->main_submap = log_.main_submap(map_);
+    if (map_.corrections() == next->corrections) break;
   }
-  copy_keyframes(*next);
-  copy_landmarks(*next);
-  next->path = path(next->main_submap);
   snapshot_ = std::move(next);
   taken_ = std::chrono::steady_clock::now();
   return snapshot_;

@@ -31,6 +31,8 @@ void Slam::load_map(SavedMap saved) {
 
 void Slam::set_initial_pose(const SE3& T_world_body) {
   if (!T_world_body.is_finite()) throw UsageError("set_initial_pose: the pose is not finite");
+  if (impl_->map.session() > 0)
+    throw UsageError("set_initial_pose: the map that was loaded has a frame of its own");
   if (impl_->log.frames() > 0) throw UsageError("set_initial_pose: call it before the first frame");
   impl_->level.set_initial_pose(T_world_body);
 }

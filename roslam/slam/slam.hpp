@@ -65,7 +65,7 @@ class ROSLAM_EXPORT Slam {
 
   /// The pose of the body at the first frame, in place of a level one in the origin. The world is that of
   /// this pose, and gravity does not turn it. Call before the first frame. Throws UsageError if it is not
-  /// finite, or later.
+  /// finite, later, or after load_map().
   void set_initial_pose(const SE3& T_world_body);
 
   /// on_frame: takes each frame's result. on_map_changed: takes what changed. Call before the first frame.

@@ -112,7 +112,7 @@ FrameResult Slam::Impl::track(const Frame& frame, const cv::Mat& mask) {
   cull_contradicted(tracked, frame, result.dynamic_objects);
   map_lock.unlock();
   if (is_levelled) publish_poses(MapChangeKind::kLevelled);
-  result.odometry = odometry.add(tracked);
+  result.odometry = odometry.add(tracked, result.submap);
   level.track(result.odometry);
 
   result.tracking_seconds = watch.seconds();
@@ -148,12 +148,16 @@ void Slam::Impl::fill(FrameResult& result, const TrackedFrame& tracked) const {
 
 // Turns the world once gravity is known better, unless its frame was given. Called with the map's mutex held.
 bool Slam::Impl::level_world() {
-  const auto submaps = map.submaps();
-  if (submaps.size() != 1 || map.session() > 0) return false;
+  if (map.corrections() != corrections_seen) level.restart();
+  corrections_seen = map.corrections();
+  // A loop that is being closed is corrected in the world as it was.
+  if (map.session() > 0 || !closing.is_idle() || map.submaps().size() != 1) return false;
   const auto R_level_world = level.correction();
   if (!R_level_world) return false;
-  map.transform(submaps.front(), SE3(*R_level_world, Eigen::Vector3d::Zero()));
+  const SE3 T_level_world(*R_level_world, Eigen::Vector3d::Zero());
+  map.transform(map.submaps().front(), T_level_world);
   map.note_correction();
+  odometry.world_changed(T_level_world);
   return true;
 }
 

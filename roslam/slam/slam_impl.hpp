@@ -39,7 +39,10 @@ struct Slam::Impl {
   Impl(const Camera& camera, const Options& options, Mode mode, std::shared_ptr<Segmenter> segmenter,
        std::shared_ptr<const Vocabulary> vocabulary);
 
-  ~Impl() { load.release(); }  // or threads that wait would never end
+  ~Impl() {
+    load.release();    // or threads that wait would never end
+    callbacks.stop();  // what they call may use all members
+  }
 
   FrameResult process(const Frame& frame, const cv::Mat& mask);
   FrameResult track(const Frame& frame, const cv::Mat& mask);
@@ -85,6 +88,7 @@ struct Slam::Impl {
   OnMapChanged on_map_changed;
   StageTimes times;
   bool warned_of_gyroscope = false;
+  std::size_t corrections_seen = 0;             // of the map, by level
   std::map<std::string, std::string> backends;  // what runs each network
   StageTimes latency;                           // wall time
   CallbackQueue callbacks;

@@ -38,14 +38,18 @@ void Slam::Impl::map_keyframe(KeyframeId keyframe, const KeyframeWorker::ShouldS
 
 // Tells restoration, the dense map and the program that keyframes have moved.
 void Slam::Impl::publish_poses(MapChangeKind kind) {
-  if (!needs_poses() && !on_map_changed) return;
-  MapLock lock(map_mutex, "publishing of poses");
-  if (needs_poses()) poses.publish(map);
+  if (needs_poses()) {
+    const MapLock lock(map_mutex, "publishing of poses");
+    poses.publish(map);
+  }
   if (!on_map_changed) return;
-  MapChange change = live.change(kind);
-  lock.unlock();
-  if (!change.moved.empty() || !change.removed.empty())
-    callbacks.post([this, change = std::move(change)] { on_map_changed(change); });
+  // Changes are taken when they are told, so that none is lost with a call that is dropped, or overtaken.
+  callbacks.post([this, kind] {
+    MapLock lock(map_mutex, "publishing of poses");
+    const MapChange change = live.change(kind);
+    lock.unlock();
+    if (!change.moved.empty() || !change.removed.empty()) on_map_changed(change);
+  });
 }
 
 void Slam::Impl::close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop,

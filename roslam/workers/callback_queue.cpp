@@ -16,12 +16,21 @@ CallbackQueue::CallbackQueue(Mode mode) : mode_(mode) {
   if (mode == Mode::kRealTime) thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
-CallbackQueue::~CallbackQueue() { cancel(); }
+CallbackQueue::~CallbackQueue() { stop(); }
+
+void CallbackQueue::stop() {
+  cancel();
+  thread_.request_stop();
+  if (thread_.joinable()) thread_.join();
+}
 
 void CallbackQueue::post(std::function<void()> function) {
-  if (mode_ == Mode::kDeterministic) return call(function);
-  const std::scoped_lock lock(mutex_);
+  std::unique_lock lock(mutex_);
   if (is_cancelled_) return;
+  if (mode_ == Mode::kDeterministic) {
+    lock.unlock();
+    return call(function);
+  }
   waiting_.push_back(std::move(function));
   if (waiting_.size() > kRoom) {
     waiting_.pop_front();

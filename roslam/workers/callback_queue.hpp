@@ -33,6 +33,9 @@ class CallbackQueue {
   /// Discards the calls that wait.
   void cancel();
 
+  /// Discards them and waits for the one in progress; nothing is called any more.
+  void stop();
+
   /// Whether the calling thread is in a call just now.
   bool is_inside() const;
 

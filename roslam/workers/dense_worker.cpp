@@ -191,11 +191,16 @@ void DenseWorker::Impl::keep_occupancy(StageTimes& times) {
     if (!wants_occupancy_) return;
   }
   const Stopwatch watch;
-  live_occupancy_.update(mapper_, mapper_.take_changes());
+  try {
+    live_occupancy_.update(mapper_, mapper_.take_changes());
+  } catch (...) {
+    mapper_.restart_changes();  // what was taken is lost
+    throw;
+  }
   auto grid = live_occupancy_.grid(pose_lookup_({newest_}).front().submap, newest_timestamp_);
   times.add("dense.occupancy", watch.seconds());
   const std::scoped_lock lock(mutex_);
-  occupancy_ = std::move(grid);
+  if (grid) occupancy_ = std::move(grid);
 }
 
 std::map<KeyframeId, KeyframePose> DenseWorker::Impl::poses_of(const std::vector<KeyframeId>& ids) const {

@@ -171,7 +171,7 @@ void add_run_command(CLI::App& program, const std::string& version) {
   command
       ->add_option("--checkpoint", arguments->flight.checkpoint,
                    "Seconds between two saved maps (map.roslam) during the run; 0: only at its end")
-      ->check(CLI::NonNegativeNumber)
+      ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
   command->add_flag("--video", arguments->flight.video,
                     "Write removal.avi too: each frame with kept and removed points");
