@@ -11,8 +11,6 @@
 namespace roslam {
 
 namespace {
-constexpr auto kSide = static_cast<unsigned>(kBlockSide);
-
 void count(std::uint16_t& counter, int sign) {
   if (sign > 0 && counter < std::numeric_limits<std::uint16_t>::max()) ++counter;
   if (sign < 0 && counter > 0) --counter;
@@ -44,16 +42,8 @@ void LiveOccupancy::see_through(Space& space, const DepthKeyframe& keyframe, con
   for (const auto& [key, marks] : cells_seen_through(keyframe, T_world_camera, resolution_)) {
     Counts& counts = space.counts[key];
     space.touched.insert(key);
-    for (unsigned z = 0; z < kSide; ++z) {
-      for (unsigned y = 0; y < kSide; ++y) {
-        for (unsigned x = 0; x < kSide; ++x) {
-          if (marks.count(x, y, z, 1) == 0) continue;
-          count(
-              counts
-                  .seen_through[Block::index(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z))],
-              sign);
-        }
-      }
+    for (std::size_t i = 0; i < counts.seen_through.size(); ++i) {
+      if (marks.count(i & 7U, i >> 3U & 7U, i >> 6U, 1) > 0) count(counts.seen_through[i], sign);
     }
   }
 }

@@ -23,7 +23,6 @@ double OccupancyGrid::resolution() const { return content_->resolution; }
 SubmapId OccupancyGrid::submap() const { return content_->submap; }
 std::size_t OccupancyGrid::keyframes() const { return content_->keyframes; }
 double OccupancyGrid::timestamp() const { return content_->timestamp; }
-std::size_t OccupancyGrid::blocks() const { return content_->blocks.size(); }
 
 void OccupancyGrid::visit(const Visitor& visitor) const {
   for (const auto& [key, cells] : content_->blocks) visitor({first_cell(key), *cells});

@@ -39,7 +39,6 @@ class ROSLAM_EXPORT OccupancyGrid {
   std::size_t keyframes() const;  ///< that it is made of
   double timestamp() const;       ///< seconds, of the newest of them: how old the grid is
 
-  std::size_t blocks() const;
   void visit(const Visitor& visitor) const;
 
   /// Visits the blocks that differ from those of an earlier grid. A block that is gone is visited with
