@@ -13,7 +13,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "evaluation/trajectory_plot.hpp"
@@ -37,6 +36,7 @@ struct RunFolder::Output {
   const char* file;
   std::function<void(const Path&)> write;
   Result result = Result::kWritten;
+  bool is_essential = false;  // written however urgent the end of the run is
 };
 
 RunFolder::Result RunFolder::if_any(bool is_any, Result otherwise) {
@@ -181,15 +181,13 @@ void RunFolder::write(const Slam& slam, const RunResults& summary, const FrameSo
                       const RunDescription& description, const std::function<bool()>& is_urgent) const {
   const Trajectory trajectory = slam.trajectory();
   const bool has_occupancy = summary.dense && summary.dense->occupancy;
-  const auto is_essential = [](const Output& output) {
-    return std::string_view(output.file) == "run.json" || std::string_view(output.file) == "groundtruth.txt";
-  };
   write_all(
       {
           {"run.json",
-           [&](const Path& file) { write_file(file, run_report(slam, summary, source, description)); }},
+           [&](const Path& file) { write_file(file, run_report(slam, summary, source, description)); },
+           Result::kWritten, true},
           {"groundtruth.txt", [&](const Path& file) { write_trajectory(file, summary.truth); },
-           if_any(!summary.truth.empty(), Result::kRemoved)},
+           if_any(!summary.truth.empty(), Result::kRemoved), true},
           {"trajectory.png",
            [&](const Path& file) { write_png(file, plot_trajectory(trajectory, "RO-SLAM", WorldUp::kZ)); },
            if_any(!trajectory.empty(), Result::kRemoved)},
@@ -203,14 +201,13 @@ void RunFolder::write(const Slam& slam, const RunResults& summary, const FrameSo
              replace_file(file, run_page(slam, summary, source, description, path_));
            }},
       },
-      [&](const Output& output) { return !is_essential(output) && is_urgent && is_urgent(); });
+      is_urgent);
 }
 
-void RunFolder::write_all(const std::vector<Output>& outputs,
-                          const std::function<bool(const Output&)>& is_left_out) const {
+void RunFolder::write_all(const std::vector<Output>& outputs, const std::function<bool()>& is_urgent) const {
   std::exception_ptr first_failure;
   for (const auto& output : outputs) {
-    if (is_left_out && is_left_out(output)) continue;
+    if (!output.is_essential && is_urgent && is_urgent()) continue;
     try {
       write_one(output, path_ / output.file);
     } catch (const OutputError&) {

@@ -94,8 +94,7 @@ class RunFolder {
   struct Output;
   static Result if_any(bool is_any, Result otherwise);
   static void write_one(const Output& output, const std::filesystem::path& file);
-  void write_all(const std::vector<Output>& outputs,
-                 const std::function<bool(const Output&)>& is_left_out = {}) const;
+  void write_all(const std::vector<Output>& outputs, const std::function<bool()>& is_urgent = {}) const;
 
   std::filesystem::path path_;
   FolderLock lock_;

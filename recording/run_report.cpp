@@ -101,15 +101,19 @@ Json frames_json(const Slam& slam, const RunResults& summary, const FrameSource&
           {"notes", counts_json(source.notes())}};
 }
 
+// Milliseconds.
+void put_quantiles(const StageSummary& s, Json& json) {
+  json["median"] = rounded(s.median_ms, 3);
+  json["p95"] = rounded(s.p95_ms, 3);
+  json["p99"] = rounded(s.p99_ms, 3);
+  json["max"] = rounded(s.max_ms, 3);
+}
+
 Json times_json(const StageTimes& times) {
   Json json = Json::object();
   for (const auto& [stage, s] : times.summary()) {
-    json[stage] = {{"count", s.count},
-                   {"mean", rounded(s.mean_ms, 3)},
-                   {"median", rounded(s.median_ms, 3)},
-                   {"p95", rounded(s.p95_ms, 3)},
-                   {"p99", rounded(s.p99_ms, 3)},
-                   {"max", rounded(s.max_ms, 3)}};
+    json[stage] = {{"count", s.count}, {"mean", rounded(s.mean_ms, 3)}};
+    put_quantiles(s, json[stage]);
   }
   return json;
 }
@@ -123,13 +127,8 @@ Json latency_json(const Slam& slam) {
             {"waited_for", locks.waited_for},
             {"longest_hold_of_map", held}};
   const auto summaries = slam.latency().summary();
-  if (const auto found = summaries.find("latency"); found != summaries.end()) {
-    const StageSummary& s = found->second;
-    json["median"] = rounded(s.median_ms, 3);
-    json["p95"] = rounded(s.p95_ms, 3);
-    json["p99"] = rounded(s.p99_ms, 3);
-    json["max"] = rounded(s.max_ms, 3);
-  }
+  if (const auto found = summaries.find("latency"); found != summaries.end())
+    put_quantiles(found->second, json);
   return json;
 }
 

@@ -161,8 +161,7 @@ SE3 Flight::T_world_camera(double time) const {
   const double yaw = waypoint.heading + 1.0 * degree * channel(3, 0.11) + 25.0 * degree * gust(2);
   const double pitch = options_.pitch_down + 0.9 * degree * channel(4, 0.15) + 4.0 * degree * gust(3);
   const double roll = 0.9 * degree * channel(5, 0.13) + 6.0 * degree * gust(4);
-  Eigen::Matrix3d R_body_camera;
-  R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const Eigen::Matrix3d R_body_camera = forward_camera().rotation().toRotationMatrix();
   const Eigen::Matrix3d R_world_body =
       (Eigen::AngleAxisd(yaw, Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Vector3d::UnitY()) *
        Eigen::AngleAxisd(roll, Vector3d::UnitX()))

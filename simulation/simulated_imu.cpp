@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "roslam/geometry/mount.hpp"
 #include "simulation/simulated_noise.hpp"
 
 namespace roslam::simulation {
@@ -21,9 +22,7 @@ Eigen::Vector3d noise(std::uint32_t seed) {
 }  // namespace
 
 ImuCalibration simulated_imu() {
-  Eigen::Matrix3d R_camera_imu;
-  R_camera_imu << 0, -1, 0, 0, 0, -1, 1, 0, 0;
-  return {SE3(R_camera_imu, Eigen::Vector3d(0.03, 0.005, -0.01)), 2e-3, 1e-4};
+  return {SE3(forward_camera().rotation().inverse(), Eigen::Vector3d(0.03, 0.005, -0.01)), 2e-3, 1e-4};
 }
 
 Eigen::Vector3d gyroscope_bias(double time, std::uint32_t seed) {

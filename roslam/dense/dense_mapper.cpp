@@ -141,16 +141,16 @@ void DenseMapper::limit_memory() {
 
 DenseChanges DenseMapper::take_changes() {
   if (voxel_size_ == 0.0) return {};  // nothing was fused yet
-  const Changes taken = std::exchange(changes_, {});
+  Changes taken = std::exchange(changes_, {});
   changes_.are_kept = true;
   if (!taken.are_kept) return all();
   DenseChanges result;
-  result.blocks = taken.blocks;
+  result.blocks = std::move(taken.blocks);
   for (const auto& [id, before] : taken.before) {
     if (const auto fused = fused_.find(id); fused != fused_.end()) {
       result.keyframes.push_back({id, before, fused->second.pose, {}});
     } else if (const auto gone = taken.gone.find(id); gone != taken.gone.end() && before.submap.is_valid()) {
-      result.keyframes.push_back({id, before, {}, gone->second.keyframe});
+      result.keyframes.push_back({id, before, {}, std::move(gone->second.keyframe)});
     }
   }
   return result;

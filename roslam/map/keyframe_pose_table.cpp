@@ -10,12 +10,15 @@ namespace roslam {
 
 namespace {
 KeyframePose pose_of(const Map& map, KeyframeId id) {
-  if (map.is_withdrawn(id)) return {};
+  return map.is_withdrawn(id) ? KeyframePose{} : keyframe_pose(map, id);
+}
+}  // namespace
+
+KeyframePose keyframe_pose(const Map& map, KeyframeId id) {
   const auto [anchor, T_camera_anchor] = map.T_camera_anchor(id);
   const Keyframe& keyframe = *map.find(anchor);
   return {keyframe.submap, (T_camera_anchor * keyframe.T_camera_world).inverse()};
 }
-}  // namespace
 
 void KeyframePoseTable::publish(const Map& map) {
   auto poses = std::make_shared<Poses>();

@@ -10,6 +10,9 @@
 
 namespace roslam {
 
+/// The pose of a keyframe, also of one that was removed or withdrawn. The caller holds the map's mutex.
+KeyframePose keyframe_pose(const Map& map, KeyframeId keyframe);
+
 /// Poses of all keyframes as they were published last. Threads of lower priority read them here and not in
 /// the map: a thread that is preempted while it holds the map's mutex would keep the tracker waiting
 /// (priority inversion). The mutex here is held to copy a pointer only. May be used from any thread.

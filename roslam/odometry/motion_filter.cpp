@@ -63,14 +63,20 @@ FilteredMotion mixture(const std::array<const FilteredMotion*, N>& states,
   }
   return result;
 }
+
+// Of a measured pose against a state.
+Vector6d innovation_of(const SE3& T_odom_body, const FilteredMotion& state) {
+  FilteredMotion measured = state;
+  measured.T_odom_body = T_odom_body;
+  return difference(measured, state).head<6>();
+}
+
 // A pose that even a gust does not explain is wrong by some part: its covariance is widened along its
 // deviation to the 99 % limit, as a change of the scene in view may move the pose by centimetres between two
 // images.
 Matrix6d robust(const FilteredMotion& predicted, const SE3& T_odom_body, const Matrix6d& covariance) {
   constexpr double kLimit = 11.34;  // chi-squared, 3 degrees of freedom
-  FilteredMotion measured = predicted;
-  measured.T_odom_body = T_odom_body;
-  const Vector12d innovation = difference(measured, predicted);
+  const Vector6d innovation = innovation_of(T_odom_body, predicted);
   Matrix6d result = covariance;
   for (const int at : {0, 3}) {
     const Eigen::Vector3d off = innovation.segment<3>(at);
@@ -151,9 +157,7 @@ void MotionFilter::update(const SE3& T_odom_body, const Matrix6d& covariance_of_
 // Returns the logarithm of the likelihood of the measurement, without a constant.
 double MotionFilter::update(Model& model, const SE3& T_odom_body, const Matrix6d& covariance) {
   FilteredMotion& s = model.state;
-  FilteredMotion measured = s;
-  measured.T_odom_body = T_odom_body;
-  const Vector6d innovation = difference(measured, s).head<6>();
+  const Vector6d innovation = innovation_of(T_odom_body, s);
   const Eigen::LDLT<Matrix6d> S(s.covariance.topLeftCorner<6, 6>() + covariance);
   const Eigen::Matrix<double, 12, 6> K = S.solve(s.covariance.topRows<6>()).transpose();
   move(s, K * innovation);

@@ -75,8 +75,7 @@ void OdometryEstimator::place(const TrackedFrame& frame, SubmapId submap) {
 SE3 OdometryEstimator::beside_last(const TrackedFrame& frame) const {
   const SE3 T_map_camera = frame.T_camera_world ? frame.T_camera_world->inverse() : SE3();
   if (placed_.empty()) return T_map_camera;
-  const SE3 T_body_odom = T_body_camera_ * placed_.back().T_odom_camera.inverse();
-  const SE3 T_odom_last = T_body_odom.inverse();
+  const SE3 T_odom_last = placed_.back().T_odom_camera * T_body_camera_.inverse();
   const SE3 T_map_body = T_map_camera * T_body_camera_.inverse();
   const Eigen::Quaterniond turn(
       Eigen::AngleAxisd(yaw_of(T_odom_last) - yaw_of(T_map_body), Eigen::Vector3d::UnitZ()));

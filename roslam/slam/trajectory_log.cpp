@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "roslam/map/keyframe_pose_table.hpp"
+
 namespace roslam {
 
 namespace {
@@ -105,8 +107,7 @@ Trajectory TrajectoryLog::trajectory(const Map& map, SubmapId submap) const {
 std::vector<KeyframePose> TrajectoryLog::keyframe_poses(const Map& map) {
   std::vector<KeyframePose> poses;
   poses.reserve(map.keyframe_slots());
-  for (std::uint32_t i = 0; i < map.keyframe_slots(); ++i)
-    poses.push_back({map.submap_of(KeyframeId{i}), map.T_camera_world(KeyframeId{i}).inverse()});
+  for (std::uint32_t i = 0; i < map.keyframe_slots(); ++i) poses.push_back(keyframe_pose(map, KeyframeId{i}));
   return poses;
 }
 

@@ -199,8 +199,10 @@ bool Tracker::is_accepted(TrackedFrame& frame, int min_inliers) {
   const TrackedState* confirmed =
       is_by_motion && is_strong(frame) ? confirmed_here(frame.reference, frame.timestamp) : nullptr;
   is_contradiction_ = confirmed != nullptr && motion_.doubt(*confirmed, frame) == PoseDoubt::kNone;
-  if (is_contradiction_) frame.doubt = PoseDoubt::kNone;
-  if (is_contradiction_) return true;
+  if (is_contradiction_) {
+    frame.doubt = PoseDoubt::kNone;
+    return true;
+  }
   if (doubt != PoseDoubt::kNone) ++doubts_[doubt];
   if (doubt == PoseDoubt::kGyroscope && is_strong(frame)) motion_.note_refusal();
   return doubt == PoseDoubt::kNone;
