@@ -6,7 +6,7 @@
 
 #include "benchmarks/benchmarks.hpp"
 #include "roslam/dense/dense_mapper.hpp"
-#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 
 namespace roslam::benchmarks {
 

@@ -53,8 +53,8 @@ set(ROSLAM_PUBLIC_HEADERS
   restoration/restored_image.hpp
   dense/dense_map.hpp
   dense/dense_options.hpp
-  dense/occupancy_grid.hpp
-  dense/occupancy_map.hpp
+  occupancy/occupancy_grid.hpp
+  occupancy/occupancy_map.hpp
   dense/surface_file.hpp
   dense/surface_map.hpp
   slam/frame_result.hpp

@@ -4,9 +4,9 @@
 #include <iostream>
 
 #include "roslam/common/error.hpp"
-#include "roslam/dense/occupancy_map.hpp"
 #include "roslam/dense/surface_file.hpp"
 #include "roslam/geometry/camera.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 #include "roslam/sensors/tum_source.hpp"
 #include "roslam/slam/open_slam.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 
 #include "fuzz/fuzz.hpp"
 

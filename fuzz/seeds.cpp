@@ -5,10 +5,10 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/write_file.hpp"
-#include "roslam/dense/occupancy_map.hpp"
 #include "roslam/dense/surface_file.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/map_io/map_file.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 #include "roslam/options/options.hpp"
 #include "tests/onnx_writer.hpp"
 

@@ -45,8 +45,11 @@ bool AppendedFile::append(std::string_view lines) {
     return false;
   }
   size_ += lines.size();
-  fdatasync(descriptor_);
   return true;
+}
+
+bool AppendedFile::sync() {
+  return fdatasync(descriptor_) == 0 || errno == EINVAL || errno == EROFS;  // EINVAL: a device or a pipe
 }
 
 void AppendedFile::replace(std::string_view content) {

@@ -21,6 +21,9 @@ class AppendedFile {
   /// Appends lines. Returns false if they cannot be written now; the file is as before then.
   bool append(std::string_view lines);
 
+  /// Waits until what was appended is on the disk. Returns false if the disk refused it.
+  bool sync();
+
   /// Replaces the whole content at once. Throws OutputError; the file is as before then.
   void replace(std::string_view content);
 

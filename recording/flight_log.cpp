@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recording/flight_log.hpp"
 
-#include <array>
-#include <charconv>
 #include <chrono>
 #include <exception>
-#include <initializer_list>
-#include <string_view>
 #include <utility>
 
+#include "recording/odometry_file.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/common/thread_priority.hpp"
+#include "roslam/dense/surface_file.hpp"
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/map_io/map_file.hpp"
 
@@ -24,66 +22,21 @@ constexpr auto kPathInterval = std::chrono::seconds(5);  // between two versions
 constexpr std::size_t kMostPoses = 100000;               // that may wait for the disk
 constexpr std::size_t kMostWaiting = 8U << 20U;          // bytes of lines that may wait for the disk
 
-void append(std::string& line, double value, std::chars_format format, int precision) {
-  std::array<char, 400> digits{};
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value, format, precision);
-  line += ',';
-  line.append(digits.data(), end.ptr);
-}
-
-void append(std::string& line, const SE3& pose) {
-  const auto& p = pose.translation();
-  Eigen::Quaterniond q = pose.rotation();
-  if (q.w() < 0.0) q.coeffs() = -q.coeffs();
-  for (const double value : {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()})
-    append(line, value, std::chars_format::fixed, 9);
-}
-
-void append(std::string& line, const Eigen::Vector3d& vector) {
-  for (int k = 0; k < 3; ++k) append(line, vector(k), std::chars_format::fixed, 6);
-}
-
-void append_upper_triangle(std::string& line, const Matrix6d& matrix) {
-  for (int row = 0; row < 6; ++row) {
-    for (int column = row; column < 6; ++column)
-      append(line, matrix(row, column), std::chars_format::general, 6);
-  }
+// On a thread of its own, as a priority once lowered cannot be raised again.
+template <typename Step>
+void at_low_priority(const Step& step) {
+  std::exception_ptr failure;
+  std::jthread([&] {
+    lower_thread_priority(ThreadPriority::kLowest);
+    try {
+      step();
+    } catch (...) {
+      failure = std::current_exception();
+    }
+  }).join();
+  if (failure) std::rethrow_exception(failure);
 }
 }  // namespace
-
-std::string odometry_header() {
-  std::string header = "#timestamp,state,reset,quality,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz";
-  constexpr std::array<std::string_view, 6> kPose{"px", "py", "pz", "rx", "ry", "rz"};
-  constexpr std::array<std::string_view, 6> kVelocity{"vx", "vy", "vz", "wx", "wy", "wz"};
-  for (const auto& names : {kPose, kVelocity}) {
-    for (std::size_t row = 0; row < names.size(); ++row) {
-      for (std::size_t column = row; column < names.size(); ++column)
-        header.append(",cov_").append(names[row]).append("_").append(names[column]);
-    }
-  }
-  return header + ",map_px,map_py,map_pz,map_qx,map_qy,map_qz,map_qw,reason\n";
-}
-
-std::string odometry_line(const FrameResult& result) {
-  std::string line = time_text(result.timestamp);
-  line.append(",").append(name_of(result.state));
-  constexpr std::size_t kNumbers = 15 + 2 * 21 + 7;  // after the state; none for a frame without a pose
-  if (!result.odometry) {
-    line.append(kNumbers, ',').append(",").append(describe(result.no_pose)).append("\n");
-    return line;
-  }
-  const Odometry& odometry = *result.odometry;
-  line.append(",").append(std::to_string(odometry.resets));
-  append(line, odometry.quality, std::chars_format::fixed, 3);
-  append(line, odometry.T_odom_body);
-  append(line, odometry.linear_velocity);
-  append(line, odometry.angular_velocity);
-  append_upper_triangle(line, odometry.covariance);
-  append_upper_triangle(line, odometry.velocity_covariance);
-  append(line, odometry.T_map_odom);
-  line += ",\n";
-  return line;
-}
 
 template <typename Step>
 void FlightLog::attempt(const Step& step) {
@@ -130,7 +83,8 @@ void FlightLog::work(const std::stop_token& stop) {
     bool is_path_old = false;
     {
       std::unique_lock lock(mutex_);
-      tick_.wait_for(lock, stop, kFlush, [] { return false; });
+      tick_.wait_for(lock, stop, kFlush, [this] { return wants_flush_; });
+      wants_flush_ = false;
       is_path_old = is_path_old_;
     }
     append();
@@ -142,6 +96,7 @@ void FlightLog::work(const std::stop_token& stop) {
     }
     if (now >= map_due) {
       if (settings_.saves_map) attempt([&] { save_map_file(); });
+      if (settings_.saves_dense) attempt([&] { save_dense_map(); });
       map_due = Clock::now() + checkpoint;
     }
   }
@@ -160,8 +115,10 @@ void FlightLog::append() {
   for (const StampedPose& pose : poses) path += trajectory_line(pose);
   const bool has_odometry = odometry.empty() || (odometry_ && odometry_->append(odometry));
   const bool has_path = path.empty() || !trajectory_ || trajectory_->append(path);
-  if (has_odometry && has_path) return;
+  const bool is_safe = (!odometry_ || odometry_->sync()) && (!trajectory_ || trajectory_->sync());
+  if (has_odometry && has_path && is_safe) return;
   const std::scoped_lock lock(mutex_);
+  if (!is_safe) ++faults_["odometry.csv and trajectory.txt could not be flushed to the disk"];
   if (!has_odometry) odometry_lines_.insert(0, odometry);
   if (!has_path) poses_.insert(poses_.begin(), poses.begin(), poses.end());
 }
@@ -191,19 +148,22 @@ void FlightLog::save_path() {
 }
 
 // The map is copied at normal priority, as a thread that is preempted while it holds the map would keep the
-// tracker waiting, and written at the lowest.
+// tracker waiting.
 void FlightLog::save_map_file() {
   const SavedMap saved = slam_.saved_map();
-  std::exception_ptr failure;
-  std::jthread([&] {
-    lower_thread_priority(ThreadPriority::kLowest);
-    try {
-      save_map(settings_.folder / "map.roslam", saved);
-    } catch (...) {
-      failure = std::current_exception();
-    }
-  }).join();
-  if (failure) std::rethrow_exception(failure);
+  at_low_priority([&] { save_map(settings_.folder / "map.roslam", saved); });
+}
+
+void FlightLog::save_dense_map() {
+  const auto map = slam_.dense_checkpoint();
+  if (map && !map->surface.points.empty())
+    at_low_priority([&] { write_surface_ply(settings_.folder / "dense.ply", map->surface, true); });
+}
+
+void FlightLog::flush() {
+  const std::scoped_lock lock(mutex_);
+  wants_flush_ = true;
+  tick_.notify_all();
 }
 
 void FlightLog::stop() {

@@ -16,10 +16,6 @@
 
 namespace roslam::recording {
 
-/// The header and a line of odometry.csv (docs/run_folder.md).
-std::string odometry_header();
-std::string odometry_line(const FrameResult& result);
-
 /// Saves what a run has found while it goes on, so that a program that is killed loses a second at most:
 /// odometry.csv and trajectory.txt grow with each frame, and the map is saved from time to time; the
 /// trajectory is then written anew, as the map has been corrected. On threads of its own: add() never waits
@@ -30,6 +26,7 @@ class FlightLog {
     std::filesystem::path folder;
     double checkpoint = 30.0;  ///< seconds between two saved maps; 0: none is saved
     bool saves_map = true;     ///< false where the map is only used
+    bool saves_dense = false;  ///< dense.ply as well, as of the checkpoint before
   };
 
   /// A file that cannot be made is a fault, and what it lacks is told by finish(). slam must outlive the log.
@@ -39,6 +36,9 @@ class FlightLog {
   FlightLog& operator=(const FlightLog&) = delete;
 
   void add(const FrameResult& result);
+
+  /// Writes what was added so far at once. May be called from any thread.
+  void flush();
 
   /// Ends the thread: from now on the trajectory and the map are for the caller to write.
   void stop();
@@ -54,6 +54,7 @@ class FlightLog {
   void append();
   void save_path();
   void save_map_file();
+  void save_dense_map();
   template <typename Step>
   void attempt(const Step& step);
 
@@ -66,7 +67,8 @@ class FlightLog {
   std::string odometry_lines_;      // not yet written
   Trajectory poses_;                // likewise, of trajectory.txt
   std::optional<SubmapId> submap_;  // that trajectory.txt is of
-  bool is_path_old_ = false;        // poses in it were withdrawn, or are of another submap
+  bool wants_flush_ = false;
+  bool is_path_old_ = false;  // poses in it were withdrawn, or are of another submap
   std::map<std::string, std::size_t> faults_;
   std::jthread thread_;  // last, so that it ends before the members it uses are destroyed
 };

@@ -2,6 +2,7 @@
 #include "recording/recorded_run.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -27,8 +28,23 @@ Camera camera_from(const Json& json) {
   json.at("distortion").get_to(camera.distortion);
   json.at("depth_units_per_metre").get_to(camera.depth_units_per_metre);
   json.at("fps").get_to(camera.fps);
+  if (json.contains("T_body_camera")) {
+    const auto T = json["T_body_camera"].get<std::array<double, 16>>();
+    const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(T.data());
+    camera.T_body_camera = SE3(matrix.topLeftCorner<3, 3>(), matrix.topRightCorner<3, 1>());
+  }
   camera.validate();
   return camera;
+}
+
+template <typename Read>
+void read_report(const fs::path& folder, const Read& read) {
+  const fs::path file = folder / "run.json";
+  try {
+    read(Json::parse(std::ifstream(file)));
+  } catch (const Json::exception&) {
+    throw InputError(file.string() + ": does not name the source and the camera of the run; repeat the run");
+  }
 }
 
 // A run without tracked frames leaves an empty file.
@@ -38,6 +54,12 @@ Trajectory trajectory_of(const fs::path& file) {
   return read_trajectory(file).trajectory;
 }
 }  // namespace
+
+Camera camera_of_run(const fs::path& folder) {
+  Camera camera;
+  read_report(folder, [&](const Json& json) { camera = camera_from(json.at("camera")); });
+  return camera;
+}
 
 bool RecordedRun::recognises(const fs::path& folder) {
   std::error_code error;
@@ -49,15 +71,11 @@ RecordedRun::RecordedRun(const fs::path& folder)
     : removal_(folder),
       trajectory_(trajectory_of(folder / "trajectory.txt")),
       keyframes_(trajectory_of(folder / "keyframes.txt")) {
-  const fs::path file = folder / "run.json";
-  try {
-    const Json json = Json::parse(std::ifstream(file));
+  read_report(folder, [&](const Json& json) {
     json.at("source").get_to(source_);
     if (json.contains("flight")) json["flight"].get_to(flight_);
     camera_ = camera_from(json.at("camera"));
-  } catch (const Json::exception&) {
-    throw InputError(file.string() + ": does not name the source and the camera of the run; repeat the run");
-  }
+  });
 }
 
 std::optional<SE3> RecordedRun::pose_at(double timestamp) const {

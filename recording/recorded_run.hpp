@@ -12,6 +12,9 @@
 
 namespace roslam::recording {
 
+/// The camera of a run, by its run.json. Throws InputError naming the file that is missing or damaged.
+Camera camera_of_run(const std::filesystem::path& folder);
+
 /// A finished run read from its folder: source, camera, trajectory and removed objects.
 class RecordedRun {
  public:

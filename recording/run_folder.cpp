@@ -18,10 +18,10 @@
 #include "evaluation/trajectory_plot.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/common/write_file.hpp"
-#include "roslam/dense/occupancy_map.hpp"
 #include "roslam/dense/surface_file.hpp"
 #include "roslam/map/map_ply.hpp"
 #include "roslam/map_io/map_file.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 
 namespace roslam::recording {
 

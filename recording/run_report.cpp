@@ -37,6 +37,7 @@ std::string text_of(const Json& json) {
 }
 
 Json camera_json(const Camera& camera, const RunDescription& description) {
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> T_body_camera = camera.T_body_camera.matrix();
   return {{"width", camera.width},
           {"height", camera.height},
           {"fx", camera.fx},
@@ -46,6 +47,7 @@ Json camera_json(const Camera& camera, const RunDescription& description) {
           {"distortion", camera.distortion},
           {"depth_units_per_metre", camera.depth_units_per_metre},
           {"fps", camera.fps},
+          {"T_body_camera", std::vector<double>(T_body_camera.data(), T_body_camera.data() + 16)},
           {"name", description.camera}};
 }
 

@@ -51,6 +51,25 @@ TEST(DenseMapper, IsAfterAMoveAsIfAllHadBeenFusedThere) {
   EXPECT_EQ(moved.follow(places), 0U);
 }
 
+TEST(DenseMapper, AMoveThatIsStoppedLeavesTheMapAsItWasAndIsTakenUpAgain) {
+  const Walk walk;
+  DenseMapper moved(dense_scene::options(), {}), before(dense_scene::options(), {}),
+      after(dense_scene::options(), {});
+  std::map<KeyframeId, KeyframePose> places;
+  for (std::size_t i = 0; i < walk.truth.size(); ++i) {
+    moved.insert(id(i), walk.view(i), {kHere, walk.wrong(i)});
+    before.insert(id(i), walk.view(i), {kHere, walk.wrong(i)});
+    after.insert(id(i), walk.view(i), {kHere, walk.truth[i]});
+    places[id(i)] = {kHere, walk.truth[i]};
+  }
+  int polled = 0;
+  EXPECT_EQ(moved.follow(places, 1.0, [&] { return ++polled > 2; }), walk.truth.size() - 1) << "the first was right";
+  EXPECT_EQ(polled, 3);
+  expect_same(*moved.map(kHere), *before.map(kHere));
+  EXPECT_EQ(moved.follow(places), 0U) << "they are where they belong, but for the blocks";
+  expect_same(*moved.map(kHere), *after.map(kHere));
+}
+
 TEST(DenseMapper, LeavesBeWhatHardlyMoved) {
   const Walk walk;
   DenseMapper mapper(dense_scene::options(), {});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The dense map of a run: its files, and its behaviour with bad input.
-#include "roslam/dense/occupancy_map.hpp"
 #include "roslam/dense/surface_file.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 #include "tests/street.hpp"
 
 namespace roslam::street {

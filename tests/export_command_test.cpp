@@ -11,8 +11,8 @@
 
 #include "roslam/common/write_file.hpp"
 #include "roslam/dense/depth_keyframe.hpp"
-#include "roslam/dense/occupancy_map.hpp"
 #include "roslam/dense/surface_file.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 #include "tests/program.hpp"
 #include "tests/scratch.hpp"
 

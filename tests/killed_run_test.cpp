@@ -13,7 +13,9 @@
 
 #include "recording/appended_file.hpp"
 #include "recording/flight_log.hpp"
+#include "recording/odometry_file.hpp"
 #include "roslam/common/error.hpp"
+#include "roslam/dense/surface_file.hpp"
 #include "roslam/map_io/map_file.hpp"
 #include "tests/file_size_limit.hpp"
 #include "tests/street_frames.hpp"
@@ -212,6 +214,26 @@ TEST_F(SavedInFlight, ACheckpointThatDoesNotFitLeavesTheOneBefore) {
   log.finish();
   EXPECT_EQ(rows_of(folder / "odometry.csv").size(), 61U) << "a header and a line a frame";
   EXPECT_EQ(read_trajectory(folder / "trajectory.txt").trajectory.size(), 60U);
+  fs::remove_all(folder);
+}
+
+TEST_F(SavedInFlight, TheDenseMapIsSavedWhereItIsAskedFor) {
+  const fs::path folder = scratch_path();
+  fs::create_directories(folder);
+  Options options;
+  options.dynamic_objects = *options_of_mode("none", options.dynamic_objects);
+  Slam slam(*camera_preset("simulated"), options);
+  slam.enable_dense_mapping();
+  FlightLog log({folder, 0.1, false, true}, slam);
+  for (std::size_t i = 0; i < 60 && !fs::exists(folder / "dense.ply"); ++i) {
+    log.add(slam.process((*frames_)[i]));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  log.stop();
+  ASSERT_TRUE(fs::exists(folder / "dense.ply"));
+  EXPECT_FALSE(fs::exists(folder / "map.roslam"));
+  EXPECT_GT(read_surface_ply(folder / "dense.ply").points.size(), 1000U);
+  EXPECT_TRUE(log.faults().empty());
   fs::remove_all(folder);
 }
 

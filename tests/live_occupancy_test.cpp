@@ -8,8 +8,8 @@
 #include <tuple>
 #include <vector>
 
-#include "roslam/dense/live_occupancy.hpp"
-#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/occupancy/live_occupancy.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 #include "roslam/slam/slam.hpp"
 #include "simulation/simulated_source.hpp"
 #include "tests/dense_scene.hpp"

@@ -9,7 +9,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/write_file.hpp"
-#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 #include "tests/dense_scene.hpp"
 #include "tests/program.hpp"
 #include "tests/scratch.hpp"

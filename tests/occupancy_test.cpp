@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Occupied, free and unknown cells of keyframes and surfaces with ground truth.
-#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <set>
 
 #include "roslam/common/error.hpp"
-#include "roslam/dense/ray_carving.hpp"
+#include "roslam/occupancy/ray_carving.hpp"
 #include "tests/dense_scene.hpp"
 
 namespace {

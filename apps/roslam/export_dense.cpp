@@ -10,8 +10,8 @@
 
 #include "apps/roslam/support/output.hpp"
 #include "roslam/common/error.hpp"
-#include "roslam/dense/occupancy_map.hpp"
 #include "roslam/dense/surface_file.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 
 namespace roslam::app {
 

@@ -63,54 +63,68 @@ bool DenseMapper::has_moved(const Fused& fused, const KeyframePose& pose, double
   return moved > share * options_.follow * voxel_size_;
 }
 
-std::size_t DenseMapper::follow(const std::map<KeyframeId, KeyframePose>& poses, double share) {
-  std::map<SubmapId, BlockSet> stale;
-  std::vector<const std::pair<const KeyframeId, KeyframePose>*> moved;
+std::size_t DenseMapper::follow(const std::map<KeyframeId, KeyframePose>& poses, double share,
+                                const std::function<bool()>& should_stop) {
+  const std::size_t moved = note_moved(poses, share);
+  while (!stale_.empty()) {
+    const auto& [submap, blocks] = *stale_.begin();
+    if (!reintegrate(submap, blocks, should_stop)) return moved;
+    if (changes_.are_kept) changes_.blocks[submap].insert(blocks.begin(), blocks.end());
+    stale_.erase(stale_.begin());
+  }
+  limit_memory();
+  return moved;
+}
+
+// The blocks that a moved keyframe changed, and will change, become stale.
+std::size_t DenseMapper::note_moved(const std::map<KeyframeId, KeyframePose>& poses, double share) {
   std::vector<KeyframeId> withdrawn;
-  for (const auto& [id, fused] : fused_) {
+  std::size_t moved = 0;
+  for (auto& [id, fused] : fused_) {
     const auto pose = poses.find(id);
     if (pose == poses.end() || !has_moved(fused, pose->second, share)) continue;
     const DepthKeyframe unpacked = unpack(fused.keyframe);
-    stale[fused.pose.submap].merge(
-        map_of(fused.pose.submap).affected_blocks(unpacked, fused.pose.T_world_camera));
-    const auto& [submap, T_world_camera] = pose->second;
-    if (!submap.is_valid()) {
+    const auto note = [&](const KeyframePose& at) {
+      stale_[at.submap].merge(map_of(at.submap).affected_blocks(unpacked, at.T_world_camera));
+    };
+    ++moved;
+    note(fused.pose);
+    if (!pose->second.submap.is_valid()) {
       withdrawn.push_back(id);
       continue;
     }
-    stale[submap].merge(map_of(submap).affected_blocks(unpacked, T_world_camera));
-    moved.push_back(&*pose);
-  }
-  for (const KeyframeId id : withdrawn) {
-    Fused& fused = fused_.at(id);
-    view_bytes_ -= fused.keyframe.bytes();
-    if (changes_.are_kept) {
-      changes_.before.try_emplace(id, fused.pose);
-      changes_.gone.try_emplace(id, std::move(fused));
-    }
-    fused_.erase(id);
-  }
-  for (const auto* pose : moved) {
-    Fused& fused = fused_.at(pose->first);
-    if (changes_.are_kept) changes_.before.try_emplace(pose->first, fused.pose);
+    note(pose->second);
+    if (changes_.are_kept) changes_.before.try_emplace(id, fused.pose);
     fused.pose = pose->second;
   }
-  for (const auto& [submap, blocks] : stale) reintegrate(submap, blocks);
-  if (changes_.are_kept) {
-    for (auto& [submap, blocks] : stale) changes_.blocks[submap].merge(blocks);
-  }
-  limit_memory();
-  return moved.size() + withdrawn.size();
+  for (const KeyframeId id : withdrawn) withdraw(id);
+  return moved;
 }
 
-void DenseMapper::reintegrate(SubmapId submap, const BlockSet& blocks) {
+void DenseMapper::withdraw(KeyframeId id) {
+  const auto found = fused_.find(id);
+  view_bytes_ -= found->second.keyframe.bytes();
+  if (changes_.are_kept) {
+    changes_.before.try_emplace(id, found->second.pose);
+    changes_.gone.try_emplace(id, std::move(found->second));
+  }
+  fused_.erase(found);
+}
+
+// The blocks are made anew beside the map and replace those in it once they are whole. Returns false if it
+// was stopped before.
+bool DenseMapper::reintegrate(SubmapId submap, const BlockSet& blocks,
+                              const std::function<bool()>& should_stop) {
   TsdfVolume& map = map_of(submap);
-  map.erase(blocks);
+  TsdfVolume anew(voxel_size_, options_, noise_);
   for (const auto& [id, fused] : fused_) {
     if (fused.pose.submap != submap || !is_in_reach(fused, map, blocks)) continue;
-    map.integrate(unpack(fused.keyframe), fused.pose.T_world_camera, &blocks);
+    if (should_stop && should_stop()) return false;
+    anew.integrate(unpack(fused.keyframe), fused.pose.T_world_camera, &blocks);
   }
+  map.replace(blocks, std::move(anew));
   if (map.blocks() == 0) maps_.erase(submap);
+  return true;
 }
 
 // Whether any of the blocks is within the largest fused depth.
@@ -134,6 +148,7 @@ void DenseMapper::limit_memory() {
     ++times_coarsened_;
     changes_ = {};
     maps_.clear();
+    stale_.clear();
     for (const auto& [id, fused] : fused_)
       map_of(fused.pose.submap).integrate(unpack(fused.keyframe), fused.pose.T_world_camera);
   }

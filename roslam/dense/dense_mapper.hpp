@@ -43,8 +43,10 @@ class DenseMapper {
 
   /// Re-integrates keyframes at their corrected poses. Those that moved by less than share times
   /// DenseOptions::follow voxels stay; those without a submap were withdrawn and leave the map. Returns the
-  /// number of keyframes that moved or left.
-  std::size_t follow(const std::map<KeyframeId, KeyframePose>& poses, double share = 1.0);
+  /// number of keyframes that moved or left. should_stop: polled once a keyframe; blocks that it keeps from
+  /// being re-integrated stay as they were and are left to the next call.
+  std::size_t follow(const std::map<KeyframeId, KeyframePose>& poses, double share = 1.0,
+                     const std::function<bool()>& should_stop = {});
 
   /// Ids of the fused keyframes, ascending.
   std::vector<KeyframeId> keyframes() const;
@@ -88,7 +90,9 @@ class DenseMapper {
 
   TsdfVolume& map_of(SubmapId submap);
   bool has_moved(const Fused& fused, const KeyframePose& pose, double share) const;
-  void reintegrate(SubmapId submap, const BlockSet& blocks);
+  std::size_t note_moved(const std::map<KeyframeId, KeyframePose>& poses, double share);
+  void withdraw(KeyframeId id);
+  bool reintegrate(SubmapId submap, const BlockSet& blocks, const std::function<bool()>& should_stop);
   bool is_in_reach(const Fused& fused, const TsdfVolume& map, const BlockSet& blocks) const;
   void limit_memory();
   DenseChanges all() const;
@@ -106,6 +110,7 @@ class DenseMapper {
   double voxel_size_;
   std::map<KeyframeId, Fused> fused_;
   std::map<SubmapId, TsdfVolume> maps_;
+  std::map<SubmapId, BlockSet> stale_;  // to be re-integrated
   std::size_t view_bytes_ = 0;
   int times_coarsened_ = 0;
   Changes changes_;

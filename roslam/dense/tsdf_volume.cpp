@@ -120,8 +120,9 @@ std::vector<BlockKey> TsdfVolume::keys() const {
   return result;
 }
 
-void TsdfVolume::erase(const BlockSet& blocks) {
+void TsdfVolume::replace(const BlockSet& blocks, TsdfVolume other) {
   for (const BlockKey& key : blocks) blocks_.erase(key);
+  blocks_.merge(other.blocks_);
 }
 
 // Blocks around the surfaces of the keyframe.

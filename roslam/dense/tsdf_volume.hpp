@@ -32,7 +32,8 @@ class TsdfVolume {
   /// Blocks that integrating the keyframe at that pose changes.
   BlockSet affected_blocks(const DepthKeyframe& keyframe, const SE3& T_world_camera) const;
 
-  void erase(const BlockSet& blocks);
+  /// Replaces these blocks by those of another volume of the same voxels; those that it lacks are erased.
+  void replace(const BlockSet& blocks, TsdfVolume other);
 
   const Block* find(const BlockKey& key) const;  ///< null if not allocated
 

@@ -124,6 +124,10 @@ std::optional<DenseMap> Slam::dense_map(const std::stop_token& stop) const {
   return impl_->dense->result(main_submap(), stop);
 }
 
+std::shared_ptr<const DenseMap> Slam::dense_checkpoint() const {
+  return impl_->dense ? impl_->dense->checkpoint(main_submap()) : nullptr;
+}
+
 std::vector<ClosedLoop> Slam::loops() const {
   const MapLock lock(impl_->map_mutex, kReading);
   return impl_->loop_closer ? impl_->loop_closer->closed() : std::vector<ClosedLoop>{};

@@ -15,12 +15,12 @@
 #include "roslam/common/export.hpp"
 #include "roslam/common/stage_times.hpp"
 #include "roslam/dense/dense_map.hpp"
-#include "roslam/dense/occupancy_grid.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/loop_closing/closed_loop.hpp"
 #include "roslam/map/map_mutex.hpp"
 #include "roslam/map_io/saved_map.hpp"
+#include "roslam/occupancy/occupancy_grid.hpp"
 #include "roslam/options/options.hpp"
 #include "roslam/restoration/inpainter.hpp"
 #include "roslam/semantics/segmenter.hpp"
@@ -135,6 +135,11 @@ class ROSLAM_EXPORT Slam {
   /// The dense map of the main submap; nothing if none is made, or if stop was requested before it was
   /// extracted.
   std::optional<DenseMap> dense_map(const std::stop_token& stop = {}) const;
+
+  /// The dense map of the main submap in flight, to be saved from time to time: each call asks for one, which
+  /// is made with the next keyframe, and returns the one that the call before asked for; null if there is
+  /// none yet. May be called from any thread.
+  std::shared_ptr<const DenseMap> dense_checkpoint() const;
 
   /// Loops that were closed so far, how many were rejected, and what failed, by message.
   std::vector<ClosedLoop> loops() const;

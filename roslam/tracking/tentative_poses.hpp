@@ -17,6 +17,9 @@ struct TrackedState {
   SE3 T_camera_reference;            ///< its pose in its reference keyframe, which the map may correct
   std::optional<Vector6d> velocity;  ///< twist of T_current_last, per second; nothing: unknown
 
+  /// World positions of the frame's landmarks when it was tracked; of none: zero.
+  std::vector<Eigen::Vector3d> positions = {};
+
   /// Following later corrections of the map; nothing before the first frame.
   std::optional<SE3> T_camera_world(const Map& map) const {
     if (!frame.reference.is_valid()) return frame.T_camera_world;

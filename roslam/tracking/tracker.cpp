@@ -423,7 +423,10 @@ bool Tracker::contradicts_last(const TrackedFrame& frame) {
 // The pose of an earlier frame by its landmarks as they are now. Where mapping has moved them, it does not
 // move with its reference alone.
 SE3 Tracker::measured_again(const TrackedState& state) const {
+  constexpr double kSame = 1e-6;  // metres, radians
   const SE3 T_camera_world = *state.T_camera_world(map_);
+  const SE3 moved = T_camera_world * state.frame.T_camera_world->inverse();
+  bool has_moved = moved.translation().norm() > kSame || moved.angle() > kSame;
   std::vector<Eigen::Vector3d> positions;
   std::vector<std::uint32_t> points;
   std::vector<LandmarkId> landmarks(state.frame.landmarks.size());
@@ -434,8 +437,10 @@ SE3 Tracker::measured_again(const TrackedState& state) const {
     landmarks[i] = id;
     positions.push_back(landmark->position);
     points.push_back(i);
+    has_moved |= landmark->position != state.positions[i];
   }
-  if (static_cast<int>(points.size()) < settings_.tracker.trusted_inliers) return T_camera_world;
+  if (!has_moved || static_cast<int>(points.size()) < settings_.tracker.trusted_inliers)
+    return T_camera_world;
   const OptimisedPose pose = optimise_frame(camera_, map_, *state.frame.view, points, positions,
                                             T_camera_world, settings_.noise, settings_.pose, landmarks, {});
   return pose.inliers >= settings_.tracker.trusted_inliers ? pose.T_camera_world : T_camera_world;
@@ -446,11 +451,21 @@ void Tracker::remember(TrackedFrame& frame) {
     frame.motion = {last_.frame.timestamp, *frame.T_camera_world * measured_again(last_).inverse()};
   const auto velocity = motion_.velocity(last_, frame);
   last_ = {frame, *frame.T_camera_world * map_.T_camera_world(frame.reference).inverse(), velocity};
+  note_positions();
   motion_.learn(last_);
   const TrackedState* confirmed = tentative_.confirmed(frame.timestamp);
   if (confirmed != nullptr && confirmed_here(frame.reference, frame.timestamp) == nullptr)
     tentative_.restart();
   tentative_.add(last_, is_strong(frame));
+}
+
+void Tracker::note_positions() {
+  last_.positions.assign(last_.frame.landmarks.size(), Eigen::Vector3d::Zero());
+  for (std::size_t i = 0; i < last_.positions.size(); ++i) {
+    const LandmarkId id = last_.frame.landmarks[i];
+    if (const Landmark* landmark = id.is_valid() ? map_.find(id) : nullptr)
+      last_.positions[i] = landmark->position;
+  }
 }
 
 void Tracker::keyframe_created(KeyframeId id) {
@@ -459,6 +474,7 @@ void Tracker::keyframe_created(KeyframeId id) {
   last_.frame.reference = id;
   last_.frame.landmarks = keyframe.landmarks;
   last_.T_camera_reference = SE3();
+  note_positions();
   tentative_.add_keyframe(id);
 }
 

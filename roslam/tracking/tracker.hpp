@@ -132,6 +132,7 @@ class Tracker {
   bool contradicts_last(const TrackedFrame& frame);
   SE3 measured_again(const TrackedState& state) const;
   void remember(TrackedFrame& frame);
+  void note_positions();
 
   Camera camera_;
   Map& map_;

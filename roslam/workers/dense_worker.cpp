@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -14,9 +15,9 @@
 #include "roslam/common/thread_priority.hpp"
 #include "roslam/dense/dense_mapper.hpp"
 #include "roslam/dense/depth_keyframe.hpp"
-#include "roslam/dense/live_occupancy.hpp"
-#include "roslam/dense/occupancy_map.hpp"
 #include "roslam/geometry/se3f.hpp"
+#include "roslam/occupancy/live_occupancy.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 #include "roslam/restoration/source_image.hpp"
 #include "roslam/semantics/label_set.hpp"
 #include "roslam/workers/keyframe_jobs.hpp"
@@ -50,6 +51,8 @@ struct DenseWorker::Impl {
   void follow(double share);
   void add_occupancy(SubmapId submap, DenseMap& map) const;
   void keep_occupancy(StageTimes& times);
+  void make_checkpoint(StageTimes& times);
+  std::optional<DenseMap> map_of(SubmapId submap, const std::function<bool()>& should_stop) const;
 
   DenseOptions options_;
   DepthOptions depth_;
@@ -72,6 +75,8 @@ struct DenseWorker::Impl {
   std::map<KeyframeId, DenseInput> unrestored_;
   bool wants_occupancy_ = false;
   std::shared_ptr<const OccupancyGrid> occupancy_;
+  std::optional<SubmapId> wanted_checkpoint_;
+  std::shared_ptr<const DenseMap> checkpoint_;
 
   KeyframeJobs<Job> jobs_;
 
@@ -140,6 +145,7 @@ void DenseWorker::Impl::work(KeyframeId keyframe, const KeyframeWorker::ShouldSt
     newest_ = keyframe;
     newest_timestamp_ = job->input.frame.timestamp;
     keep_occupancy(times);
+    make_checkpoint(times);
   } catch (const std::exception& error) {
     jobs_.note_fault(error);
   }
@@ -212,7 +218,23 @@ std::map<KeyframeId, KeyframePose> DenseWorker::Impl::poses_of(const std::vector
 
 void DenseWorker::Impl::follow(double share) {
   since_followed_ = 0;
-  moved_ += mapper_.follow(poses_of(mapper_.keyframes()), share);
+  moved_ += mapper_.follow(poses_of(mapper_.keyframes()), share, [this] { return worker_.is_cancelled(); });
+}
+
+// Where somebody has asked for it. A cancelled one leaves the one before.
+void DenseWorker::Impl::make_checkpoint(StageTimes& times) {
+  std::optional<SubmapId> submap;
+  {
+    const std::scoped_lock lock(mutex_);
+    submap = std::exchange(wanted_checkpoint_, std::nullopt);
+  }
+  if (!submap) return;
+  const Stopwatch watch;
+  auto map = map_of(*submap, [this] { return worker_.is_cancelled(); });
+  times.add("dense.checkpoint", watch.seconds());
+  if (!map) return;
+  const std::scoped_lock lock(mutex_);
+  checkpoint_ = std::make_shared<const DenseMap>(std::move(*map));
 }
 
 void DenseWorker::drain() {
@@ -224,6 +246,12 @@ std::shared_ptr<const OccupancyGrid> DenseWorker::occupancy() {
   const std::scoped_lock lock(impl_->mutex_);
   impl_->wants_occupancy_ = true;
   return impl_->occupancy_;
+}
+
+std::shared_ptr<const DenseMap> DenseWorker::checkpoint(SubmapId submap) {
+  const std::scoped_lock lock(impl_->mutex_);
+  impl_->wanted_checkpoint_ = submap;
+  return std::exchange(impl_->checkpoint_, nullptr);
 }
 
 void DenseWorker::cancel() { impl_->worker_.cancel(); }
@@ -241,30 +269,36 @@ void DenseWorker::Impl::add_occupancy(SubmapId submap, DenseMap& map) const {
   }
 }
 
-std::optional<DenseMap> DenseWorker::result(SubmapId submap, const std::stop_token& stop) const {
-  const DenseMapper& mapper = impl_->mapper_;
+std::optional<DenseMap> DenseWorker::Impl::map_of(SubmapId submap,
+                                                  const std::function<bool()>& should_stop) const {
   DenseMap map;
-  auto surface = mapper.surface(submap, [&] { return stop.stop_requested(); });
+  auto surface = mapper_.surface(submap, should_stop);
   if (!surface) return std::nullopt;
   map.surface = std::move(*surface);
-  map.voxel_size = mapper.voxel_size();
-  map.times_coarsened = mapper.times_coarsened();
-  map.keyframes = mapper.keyframes().size();
-  map.moved = impl_->moved_;
-  map.voxel_bytes = mapper.voxel_bytes();
-  map.view_bytes = mapper.view_bytes();
+  map.voxel_size = mapper_.voxel_size();
+  map.times_coarsened = mapper_.times_coarsened();
+  map.keyframes = mapper_.keyframes().size();
+  map.moved = moved_;
+  map.voxel_bytes = mapper_.voxel_bytes();
+  map.view_bytes = mapper_.view_bytes();
   std::vector<KeyframeId> ids;
-  for (const auto& [id, points] : impl_->removed_) ids.push_back(id);
-  for (const auto& [id, pose] : impl_->poses_of(ids)) {
+  for (const auto& [id, points] : removed_) ids.push_back(id);
+  for (const auto& [id, pose] : poses_of(ids)) {
     if (pose.submap != submap) continue;
     const SE3f world_from_camera(pose.T_world_camera);
-    for (const auto& point : impl_->removed_.at(id))
+    for (const auto& point : removed_.at(id))
       map.removed.push_back({world_from_camera * point.position, Eigen::Vector3f::Zero(), point.colour});
   }
-  map.dropped = impl_->jobs_.dropped();
-  map.faults = impl_->jobs_.faults();
-  for (const auto& [fault, count] : impl_->worker_.faults()) map.faults[fault] += count;
-  if (!stop.stop_requested()) impl_->add_occupancy(submap, map);
+  if (!should_stop()) add_occupancy(submap, map);
+  return map;
+}
+
+std::optional<DenseMap> DenseWorker::result(SubmapId submap, const std::stop_token& stop) const {
+  auto map = impl_->map_of(submap, [&] { return stop.stop_requested(); });
+  if (!map) return std::nullopt;
+  map->dropped = impl_->jobs_.dropped();
+  for (const auto& [fault, count] : impl_->jobs_.faults()) map->faults[fault] += count;
+  for (const auto& [fault, count] : impl_->worker_.faults()) map->faults[fault] += count;
   return map;
 }
 

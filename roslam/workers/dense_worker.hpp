@@ -8,10 +8,10 @@
 
 #include "roslam/common/stage_times.hpp"
 #include "roslam/dense/dense_map.hpp"
-#include "roslam/dense/occupancy_grid.hpp"
 #include "roslam/dynamic_objects/dynamic_objects.hpp"
 #include "roslam/map/ids.hpp"
 #include "roslam/map/keyframe_pose.hpp"
+#include "roslam/occupancy/occupancy_grid.hpp"
 #include "roslam/options/options.hpp"
 #include "roslam/restoration/restored_image.hpp"
 #include "roslam/sensors/frame_source.hpp"
@@ -57,6 +57,10 @@ class DenseWorker {
   /// The occupancy of the submap of the keyframe that was fused last, kept up from the first call on; null
   /// before the next keyframe. May be called from any thread.
   std::shared_ptr<const OccupancyGrid> occupancy();
+
+  /// The map that the call before asked for, made when the next keyframe was fused, and asks for one of this
+  /// submap; null if it is not made yet or none was asked for. May be called from any thread.
+  std::shared_ptr<const DenseMap> checkpoint(SubmapId submap);
 
   /// The map as it is. Only after drain(). Nothing if a stop was requested before it was extracted.
   std::optional<DenseMap> result(SubmapId submap, const std::stop_token& stop = {}) const;

@@ -18,6 +18,7 @@ void DenseWorker::restored(KeyframeId, const RestoredImage*) {}
 void DenseWorker::drain() {}
 void DenseWorker::cancel() {}
 std::shared_ptr<const OccupancyGrid> DenseWorker::occupancy() { return nullptr; }
+std::shared_ptr<const DenseMap> DenseWorker::checkpoint(SubmapId) { return nullptr; }
 std::optional<DenseMap> DenseWorker::result(SubmapId, const std::stop_token&) const { return std::nullopt; }
 StageTimes DenseWorker::times() const { return {}; }
 

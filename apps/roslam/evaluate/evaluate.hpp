@@ -7,6 +7,7 @@ namespace roslam::app {
 
 // Each adds one subcommand to `roslam evaluate`.
 void add_evaluate_trajectory_command(CLI::App& evaluate);
+void add_evaluate_odometry_command(CLI::App& evaluate);
 void add_evaluate_segmentation_command(CLI::App& evaluate);
 void add_evaluate_removal_command(CLI::App& evaluate);
 void add_evaluate_restoration_command(CLI::App& evaluate);

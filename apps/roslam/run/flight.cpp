@@ -159,8 +159,11 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   std::optional<RemovalLog> log;
   if (flight.slam->options().dynamic_objects.is_on())
     log.emplace(RemovalLog::Settings{folder.path(), mode, camera.fps, arguments.video});
-  FlightLog flight_log({folder.path(), arguments.checkpoint, flight.slam->options().keyframes.enabled},
+  FlightLog flight_log({folder.path(), arguments.checkpoint, flight.slam->options().keyframes.enabled,
+                        arguments.checkpoint_dense},
                        *flight.slam);
+  // A second signal may end the program before the trajectory is written anew.
+  const std::stop_callback flush(stop, [&] { flight_log.flush(); });
   flight.summary = track(*flight.source, *flight.slam, flight_log, log, arguments.quiet, stop);
   // A step that fails must not cost the results of the others.
   std::exception_ptr failure;

@@ -25,8 +25,9 @@ struct FlightArguments {
   std::string map;      ///< to go on from; empty: none
   bool resume = false;  ///< go on with the run in `out`, whose results so far are kept
   bool localise_only = false;
-  std::string dynamic;       ///< empty: as the options say
-  double checkpoint = 30.0;  ///< seconds between two saved maps; 0: none before the end
+  std::string dynamic;            ///< empty: as the options say
+  bool checkpoint_dense = false;  ///< save the dense map with each of them as well
+  double checkpoint = 30.0;       ///< seconds between two saved maps; 0: none before the end
   bool video = false;
   bool no_dense = false;  ///< make no dense map
   bool restore = false;   ///< write the keyframes without what moves to the folder restored

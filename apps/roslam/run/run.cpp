@@ -118,9 +118,11 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "  descriptors.jsonl masks/     dynamic objects of each frame and their masks\n"
       "  removal.jpg restoration.jpg  sample images: points removed; keyframes restored\n"
       "  run.json                     options, counts, processor times, memory\n"
-      "Ctrl-C ends the run early and writes the results so far (\"interrupted\" in run.json); a second one "
+      "Ctrl-C ends the run early and writes the results so far (\"interrupted\" in run.json). A second one "
       "leaves out\n"
-      "the dense map, the report and images, a third ends the program at once.\n"
+      "the dense map, the report and images and ends the program within 0.2 s: what is not written by then "
+      "stays\n"
+      "as it was last saved during the run, which is less than a second ago for the trajectory.\n"
       "Results of an earlier run in RUN are moved to RUN/previous/.\n"
       "Exit code: 0 success, 1 an error in the input, 2 wrong usage, 3 with --strict: results are written, "
       "but not\n"
@@ -173,6 +175,8 @@ void add_run_command(CLI::App& program, const std::string& version) {
                    "Seconds between two saved maps (map.roslam) during the run; 0: only at its end")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
+  command->add_flag("--checkpoint-dense", arguments->flight.checkpoint_dense,
+                    "Save the dense map (dense.ply) as often, as it was one --checkpoint before");
   command->add_flag("--video", arguments->flight.video,
                     "Write removal.avi too: each frame with kept and removed points");
   command->add_flag("--no-dense", arguments->flight.no_dense,

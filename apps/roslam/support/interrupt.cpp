@@ -51,15 +51,18 @@ InterruptWatcher::~InterruptWatcher() {
 }
 
 void InterruptWatcher::watch() {
+  constexpr int kInterrupted = 130;  // what shells report for a program ended by Ctrl-C
+  constexpr int kPatience = 150;     // milliseconds
   int received = 0;
   while (true) {
     std::array<pollfd, 2> waiting{{{signals_, POLLIN, 0}, {leave_, POLLIN, 0}}};
-    if (poll(waiting.data(), waiting.size(), -1) < 0) continue;
+    const int ready = poll(waiting.data(), waiting.size(), received > 1 ? kPatience : -1);
+    if (ready == 0) _exit(kInterrupted);
+    if (ready < 0) continue;
     if (waiting[1].revents != 0) return;
     signalfd_siginfo info{};
     if (read(signals_, &info, sizeof(info)) != sizeof(info)) continue;
     if (received > 0 && info.ssi_signo == SIGHUP) continue;
-    constexpr int kInterrupted = 130;  // what shells report for a program ended by ctrl-C
     if (++received > expected_) _exit(kInterrupted);
     (received == 1 ? stop_ : urgent_stop_).request_stop();
   }

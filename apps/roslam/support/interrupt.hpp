@@ -9,9 +9,9 @@
 namespace roslam::app {
 
 /// Turns Ctrl-C (SIGINT), SIGTERM and SIGHUP, which a closed terminal sends, into stop tokens, also where
-/// libraries have started threads already. One signal more than are asked for ends the program at once.
-/// SIGHUP only ever asks for the first stop, as the kernel and the shell may both send it, and stays ignored
-/// if it was (nohup).
+/// libraries have started threads already. One signal more than are asked for ends the program at once, and
+/// so does the second one if the program has not ended by itself after 0.15 s. SIGHUP only ever asks for the
+/// first stop, as the kernel and the shell may both send it, and stays ignored if it was (nohup).
 class InterruptWatcher {
  public:
   /// Signals that are turned into stop tokens.
@@ -25,7 +25,7 @@ class InterruptWatcher {
   /// Requested by the first signal: end early and write what there is.
   std::stop_token token() const { return stop_.get_token(); }
 
-  /// Requested by the second signal (kTwice): leave out what takes long.
+  /// Requested by the second signal (kTwice): leave out what takes long, as the program ends 0.15 s later.
   std::stop_token urgent_token() const { return urgent_stop_.get_token(); }
 
  private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // In place of occupancy_map.cpp in a library without the component dense.
 #include "roslam/common/error.hpp"
-#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 
 namespace octomap {
 class OcTree {};

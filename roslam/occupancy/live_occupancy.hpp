@@ -8,9 +8,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "roslam/dense/cell_set.hpp"
 #include "roslam/dense/dense_mapper.hpp"
-#include "roslam/dense/occupancy_content.hpp"
+#include "roslam/occupancy/cell_set.hpp"
+#include "roslam/occupancy/occupancy_content.hpp"
 
 namespace roslam {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/dense/occupancy_grid.hpp"
+#include "roslam/occupancy/occupancy_grid.hpp"
 
-#include "roslam/dense/occupancy_content.hpp"
+#include "roslam/occupancy/occupancy_content.hpp"
 
 namespace roslam {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/dense/occupancy_map.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
 
 #include <octomap/OcTree.h>
 
@@ -11,11 +11,11 @@
 #include "roslam/common/error.hpp"
 #include "roslam/common/out_of_memory.hpp"
 #include "roslam/common/write_file.hpp"
-#include "roslam/dense/cell_set.hpp"
 #include "roslam/dense/dense_mapper.hpp"
 #include "roslam/dense/depth_keyframe.hpp"
-#include "roslam/dense/occupancy_file.hpp"
-#include "roslam/dense/ray_carving.hpp"
+#include "roslam/occupancy/cell_set.hpp"
+#include "roslam/occupancy/occupancy_file.hpp"
+#include "roslam/occupancy/ray_carving.hpp"
 
 namespace roslam {
 

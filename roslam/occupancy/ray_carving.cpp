@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/dense/ray_carving.hpp"
+#include "roslam/occupancy/ray_carving.hpp"
 
 #include <algorithm>
 #include <cmath>

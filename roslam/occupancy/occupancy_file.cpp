@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/dense/occupancy_file.hpp"
+#include "roslam/occupancy/occupancy_file.hpp"
 
 #include <cmath>
 #include <cstdint>

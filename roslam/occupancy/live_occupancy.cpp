@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/dense/live_occupancy.hpp"
+#include "roslam/occupancy/live_occupancy.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "roslam/dense/occupancy_map.hpp"
-#include "roslam/dense/ray_carving.hpp"
+#include "roslam/occupancy/occupancy_map.hpp"
+#include "roslam/occupancy/ray_carving.hpp"
 
 namespace roslam {
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <unordered_map>
 
-#include "roslam/dense/cell_set.hpp"
-#include "roslam/dense/occupancy_grid.hpp"
+#include "roslam/occupancy/cell_set.hpp"
+#include "roslam/occupancy/occupancy_grid.hpp"
 
 namespace roslam {
 

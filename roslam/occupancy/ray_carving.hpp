@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "roslam/dense/cell_set.hpp"
 #include "roslam/dense/depth_keyframe.hpp"
 #include "roslam/geometry/se3.hpp"
+#include "roslam/occupancy/cell_set.hpp"
 
 namespace roslam {
 

@@ -6,10 +6,10 @@
 #include <memory>
 
 #include "roslam/common/export.hpp"
-#include "roslam/dense/occupancy_grid.hpp"
 #include "roslam/dense/surface_map.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "roslam/map/ids.hpp"
+#include "roslam/occupancy/occupancy_grid.hpp"
 
 namespace octomap {
 class OcTree;
