@@ -137,6 +137,25 @@ TEST_F(Dense, IsInTheEndWhereTheKeyframesAre) {
     EXPECT_NEAR(point.position.z(), 100.0F + kWallDepth, 0.02F);
 }
 
+TEST_F(Dense, FollowsACorrectionOfTheWholeMapWithTheNextKeyframe) {
+  for (const bool is_told : {false, true}) {
+    shift_ = SE3();
+    start(Mode::kDeterministic);
+    EXPECT_EQ(worker_->checkpoint(kHere), nullptr);
+    worker_->submit(KeyframeId{0}, keyframe(false));
+    EXPECT_NE(worker_->checkpoint(kHere), nullptr) << "as the first call asked for it";
+    shift_ = SE3(Eigen::Quaterniond::Identity(), {0.0, 0.0, 0.5});
+    if (is_told) worker_->follow_soon();
+    worker_->submit(KeyframeId{1}, keyframe(false));
+    const auto map = worker_->checkpoint(kHere);
+    ASSERT_NE(map, nullptr);
+    const bool is_old = std::any_of(map->surface.points.begin(), map->surface.points.end(),
+                                    [](const auto& p) { return p.position.z() < kWallDepth + 0.4F; });
+    EXPECT_EQ(is_old, !is_told);
+    EXPECT_GT(map->surface.points.size(), 200U);
+  }
+}
+
 TEST_F(Dense, DropsTheOldestRatherThanToMakeAnybodyWait) {
   DenseOptions options;
   options.queue = 2;

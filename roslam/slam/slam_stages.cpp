@@ -42,6 +42,7 @@ void Slam::Impl::publish_poses(MapChangeKind kind) {
     const MapLock lock(map_mutex, "publishing of poses");
     poses.publish(map);
   }
+  if (dense && kind != MapChangeKind::kKeyframe) dense->follow_soon();
   if (!on_map_changed) return;
   // Changes are taken when they are told, so that none is lost with a call that is dropped, or overtaken.
   callbacks.post([this, kind] {

@@ -2,6 +2,7 @@
 #include "roslam/workers/dense_worker.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <exception>
 #include <functional>
@@ -71,6 +72,8 @@ struct DenseWorker::Impl {
   KeyframeId newest_;              // that was fused
   double newest_timestamp_ = 0.0;  // seconds
 
+  std::atomic<bool> is_corrected_ = false;  // as a whole, since the map was followed
+
   std::mutex mutex_;  // guards what follows
   std::map<KeyframeId, DenseInput> unrestored_;
   bool wants_occupancy_ = false;
@@ -137,7 +140,8 @@ void DenseWorker::Impl::work(KeyframeId keyframe, const KeyframeWorker::ShouldSt
     const Stopwatch watch;
     fuse(keyframe, *job);
     times.add("dense.fuse", watch.seconds());
-    if (++since_followed_ >= static_cast<std::size_t>(options_.follow_every)) {
+    ++since_followed_;
+    if (is_corrected_.exchange(false) || since_followed_ >= static_cast<std::size_t>(options_.follow_every)) {
       const Stopwatch follow_watch;
       follow(1.0);
       times.add("dense.follow", follow_watch.seconds());
@@ -236,6 +240,8 @@ void DenseWorker::Impl::make_checkpoint(StageTimes& times) {
   const std::scoped_lock lock(mutex_);
   checkpoint_ = std::make_shared<const DenseMap>(std::move(*map));
 }
+
+void DenseWorker::follow_soon() { impl_->is_corrected_ = true; }
 
 void DenseWorker::drain() {
   impl_->worker_.drain();

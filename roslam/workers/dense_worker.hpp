@@ -47,6 +47,10 @@ class DenseWorker {
   /// holes.
   void restored(KeyframeId keyframe, const RestoredImage* image);
 
+  /// The map was corrected as a whole: the dense map follows with the next keyframe. May be called from any
+  /// thread.
+  void follow_soon();
+
   /// Waits until all are fused and the map has followed the keyframes to their final poses; without the
   /// latter once cancelled.
   void drain();

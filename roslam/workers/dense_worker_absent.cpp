@@ -15,6 +15,7 @@ DenseWorker::DenseWorker(const Camera&, const Options&, Mode, PoseLookup, LoadCo
 DenseWorker::~DenseWorker() = default;
 void DenseWorker::submit(KeyframeId, DenseInput) {}
 void DenseWorker::restored(KeyframeId, const RestoredImage*) {}
+void DenseWorker::follow_soon() {}
 void DenseWorker::drain() {}
 void DenseWorker::cancel() {}
 std::shared_ptr<const OccupancyGrid> DenseWorker::occupancy() { return nullptr; }
