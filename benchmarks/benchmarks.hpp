@@ -17,6 +17,7 @@ void register_restoration_benchmarks(const std::shared_ptr<RenderedFlight>& flig
 void register_dense_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
 void register_inference_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
 void register_segmentation_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
+void register_sensors_benchmarks();
 void register_slam_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
 
 }  // namespace roslam::benchmarks

@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
   rb::register_dense_benchmarks(flight);
   rb::register_inference_benchmarks(flight);
   rb::register_segmentation_benchmarks(flight);
+  rb::register_sensors_benchmarks();
   rb::register_slam_benchmarks(flight);
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();

@@ -12,6 +12,7 @@ set(ROSLAM_PUBLIC_HEADERS
   geometry/mount.hpp
   geometry/se3.hpp
   geometry/trajectory.hpp
+  sensors/depth_registration.hpp
   sensors/frame_source.hpp
   sensors/image_file.hpp
   sensors/inertial_sample.hpp
