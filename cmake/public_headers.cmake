@@ -17,6 +17,7 @@ set(ROSLAM_PUBLIC_HEADERS
   sensors/inertial_sample.hpp
   sensors/timed_files.hpp
   sensors/tum_source.hpp
+  recordings/recording.hpp
   features/descriptor.hpp
   features/feature_grid.hpp
   features/feature_options.hpp
