@@ -36,6 +36,18 @@ foreach(module dnn photo)
   endif()
 endforeach()
 
+# Packages that recordings need, each for itself: ROSLAM_HAS_RECORDING lists those that are used.
+set(ROSLAM_RECORDING_PACKAGES LZ4 BZ2 ZSTD SQLITE3)
+include(${CMAKE_CURRENT_LIST_DIR}/recording_packages.cmake)
+list(JOIN roslam_recording_missing " " missing)
+roslam_component(RECORDINGS "${missing}" NOT missing)
+set(ROSLAM_HAS_RECORDING "")
+foreach(name ${ROSLAM_RECORDING_PACKAGES})
+  if(TARGET roslam_recording::${name} AND NOT ROSLAM_RECORDINGS STREQUAL "OFF")
+    list(APPEND ROSLAM_HAS_RECORDING ${name})
+  endif()
+endforeach()
+
 foreach(name SEMANTICS DENSE)  # as C++ writes it
   if(ROSLAM_HAS_${name})
     set(ROSLAM_CONSTANT_${name} true)

@@ -30,7 +30,8 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/roslamConfig.cmake.in
   ${PROJECT_BINARY_DIR}/roslamConfig.cmake INSTALL_DESTINATION ${ROSLAM_PACKAGE_DIR}
   PATH_VARS CMAKE_INSTALL_DATADIR)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/roslamConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_SOURCE_DIR}/cmake/onnx_runtime.cmake ${PROJECT_BINARY_DIR}/roslamConfig.cmake
+install(FILES ${PROJECT_SOURCE_DIR}/cmake/onnx_runtime.cmake ${PROJECT_SOURCE_DIR}/cmake/recording_packages.cmake
+  ${PROJECT_BINARY_DIR}/roslamConfig.cmake
   ${PROJECT_BINARY_DIR}/roslamConfigVersion.cmake DESTINATION ${ROSLAM_PACKAGE_DIR})
 
 # pkg-config. The prefix is that of the file itself, wherever it was installed to.
@@ -50,6 +51,10 @@ endif()
 if(ROSLAM_ONNX_RUNTIME_FOUND)
   string(APPEND ROSLAM_PC_PRIVATE_LIBS " -lonnxruntime")
 endif()
+foreach(name ${ROSLAM_HAS_RECORDING})
+  list(GET roslam_recording_${name} 1 library)
+  string(APPEND ROSLAM_PC_PRIVATE_LIBS " -l${library}")
+endforeach()
 string(APPEND ROSLAM_PC_PRIVATE_LIBS " -lopencv_imgcodecs -pthread")
 if(ROSLAM_IS_STATIC)  # `pkg-config --libs` without --static has to give all that a static library needs
   set(ROSLAM_PC_LIBS " ${ROSLAM_PC_PRIVATE_LIBS}")

@@ -18,6 +18,14 @@ set(ROSLAM_PUBLIC_HEADERS
   sensors/inertial_sample.hpp
   sensors/timed_files.hpp
   sensors/tum_source.hpp
+  ros/frame_tree.hpp
+  recordings/recording.hpp
+  ros/recording_contents.hpp
+  ros/recording_source.hpp
+  ros/recording_streams.hpp
+  ros/ros_images.hpp
+  ros/ros_messages.hpp
+  ros/ros_reader.hpp
   features/descriptor.hpp
   features/feature_grid.hpp
   features/feature_options.hpp

@@ -123,7 +123,7 @@ void show_info(const InfoArguments& arguments) {
   require_written_output();
 }
 
-void add_info_command(CLI::App& map) {
+void add_map_info_command(CLI::App& map) {
   const auto arguments = std::make_shared<InfoArguments>();
   CLI::App* command = map.add_subcommand("info", "Print the contents of a map");
   command->footer(
@@ -325,7 +325,7 @@ void add_export_command(CLI::App& map) {
 void add_map_command(CLI::App& program) {
   CLI::App* map = program.add_subcommand("map", "Inspect, merge or export maps that roslam run wrote");
   map->require_subcommand(1);
-  add_info_command(*map);
+  add_map_info_command(*map);
   add_merge_command(*map);
   add_export_command(*map);
 }

@@ -24,6 +24,7 @@
 #include "roslam/common/stopwatch.hpp"
 #include "roslam/common/write_file.hpp"
 #include "roslam/options/settings.hpp"
+#include "roslam/ros/recording_source.hpp"
 #include "roslam/sensors/tum_source.hpp"
 #include "simulation/simulated_source.hpp"
 
@@ -59,6 +60,9 @@ std::unique_ptr<FrameSource> open_source_of(const RecordedRun& run) {
   if (is_simulated)
     return std::make_unique<SimulatedSource>(
         *simulated_flight(flight_from_words(run.source(), run.flight())));
+  if (is_recording(run.source()))
+    return std::make_unique<RecordingSource>(
+        run.source(), flight_from_words(run.source(), run.flight()).topics, run.camera());
   return std::make_unique<TumSource>(run.source(), run.camera());
 }
 

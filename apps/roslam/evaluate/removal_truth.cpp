@@ -127,7 +127,7 @@ std::optional<MovingTruth> MovingTruthFolder::read(const std::string& name) cons
 
 std::unique_ptr<RemovalTruth> open_removal_truth(const SourceArguments& arguments) {
   if (const auto flight = simulated_flight(arguments)) return std::make_unique<FlightTruth>(*flight);
-  auto recording = open_recording(arguments);
+  auto recording = open_folder(arguments);
   const auto folder = MovingTruthFolder::open(arguments.name);
   if (!folder) return nullptr;
   return std::make_unique<RecordedTruth>(std::move(recording), *folder);

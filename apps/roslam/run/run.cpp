@@ -128,6 +128,7 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "but not\n"
       "every frame of the source has a pose, or the input is doubtful (a WARNING).");
   add_source_options(*command, arguments->flight.source);
+  add_topic_options(*command, arguments->flight.source);
   add_mount_option(*command, arguments->flight.source);
   command->add_option("--out", arguments->flight.out,
                       "Folder the results are written to; made if it does not exist (required)");

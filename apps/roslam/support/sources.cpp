@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "roslam/common/error.hpp"
+#include "roslam/ros/recording_source.hpp"
 #include "simulation/degraded_source.hpp"
 #include "simulation/simulated_source.hpp"
 
@@ -18,6 +19,14 @@ using namespace simulation;
 
 namespace {
 constexpr std::string_view kSimulated = "simulated:";
+
+template <typename Arguments, typename Visitor>
+void for_each_topic(Arguments& arguments, const Visitor& visit) {
+  visit("colour", arguments.topics.colour);
+  visit("depth", arguments.topics.depth);
+  visit("inertial", arguments.topics.inertial);
+  visit("truth", arguments.topics.truth);
+}
 
 // Lists the options of a simulated flight once, for both writing and reading.
 template <typename Arguments, typename Visitor>
@@ -37,13 +46,23 @@ void for_each_flight_option(Arguments& arguments, const Visitor& visit) {
 
 CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
   CLI::Option* source = command.add_option("SOURCE", arguments.name,
-                                           "Folder in TUM RGB-D format, or simulated:street, "
-                                           "simulated:loop, simulated:hover, simulated:turn, "
-                                           "simulated:corridor");
-  command.add_option(
-      "--camera", arguments.camera,
-      "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) or a YAML file");
+                                           "Folder in TUM RGB-D format, recording (ROS 1 bag, rosbag2 "
+                                           "file or folder, MCAP), or simulated:street, simulated:loop, "
+                                           "simulated:hover, simulated:turn, simulated:corridor");
+  command.add_option("--camera", arguments.camera,
+                     "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) "
+                     "or a YAML file; not "
+                     "needed where the source knows it");
   return source;
+}
+
+void add_topic_options(CLI::App& command, SourceArguments& arguments) {
+  command.add_option(
+      "--colour", arguments.topics.colour,
+      "Topic of the colour (or grey) images of a recording; default the one that fits, see roslam info");
+  command.add_option("--depth", arguments.topics.depth, "Topic of the depth images of a recording");
+  command.add_option("--truth", arguments.topics.truth,
+                     "Topic of ground truth poses in a recording; of tf, TOPIC:CHILD_FRAME");
 }
 
 void add_mount_option(CLI::App& command, SourceArguments& arguments) {
@@ -87,8 +106,18 @@ void add_flight_options(CLI::App& command, SourceArguments& arguments) {
       .add_option("--gusts", arguments.gusts,
                   "Gusts of wind of a simulated flight: 0 calm air, 1 turns the drone at up to 60 degrees/s")
       ->capture_default_str();
-  command.add_flag("--imu", arguments.imu,
-                   "A simulated flight has a gyroscope and an accelerometer as well, 200 Hz");
+  command
+      .add_option_function<std::string>(
+          "--imu",
+          [&arguments](const std::string& topic) {
+            arguments.imu = topic.empty();
+            arguments.topics.inertial = topic;
+          },
+          "A simulated flight has a gyroscope and an accelerometer as well, 200 Hz; with a TOPIC: that of "
+          "the "
+          "inertial samples of a recording")
+      ->type_name("[TOPIC]")
+      ->expected(0, 1);
   command.add_option("--gain", arguments.gain, "Factor of the image brightness of a simulated flight")
       ->capture_default_str();
 }
@@ -124,8 +153,13 @@ std::optional<SimulatorOptions> simulated_flight(const SourceArguments& argument
 }
 
 std::map<std::string, std::string> flight_in_words(const SourceArguments& arguments) {
-  if (!arguments.name.starts_with(kSimulated)) return {};
   std::map<std::string, std::string> words;
+  if (!arguments.name.starts_with(kSimulated)) {
+    for_each_topic(arguments, [&](const char* name, const std::string& topic) {
+      if (!topic.empty()) words[name] = topic;
+    });
+    return words;
+  }
   for_each_flight_option(arguments, [&](const char* name, const auto& value) {
     std::ostringstream text;
     text << std::setprecision(std::numeric_limits<double>::max_digits10) << value;
@@ -137,6 +171,12 @@ std::map<std::string, std::string> flight_in_words(const SourceArguments& argume
 SourceArguments flight_from_words(const std::string& name, const std::map<std::string, std::string>& words) {
   SourceArguments arguments;
   arguments.name = name;
+  if (!name.starts_with(kSimulated)) {
+    for_each_topic(arguments, [&](const char* key, std::string& topic) {
+      if (const auto found = words.find(key); found != words.end()) topic = found->second;
+    });
+    return arguments;
+  }
   for_each_flight_option(arguments, [&](const char* key, auto& value) {
     const auto found = words.find(key);
     if (found == words.end()) return;
@@ -150,26 +190,48 @@ SourceArguments flight_from_words(const std::string& name, const std::map<std::s
   return arguments;
 }
 
-std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments) {
+namespace {
+Camera with_mount(Camera camera, const SourceArguments& arguments) {
+  if (!arguments.mount.empty()) camera.T_body_camera = mount_from(arguments.mount);
+  return camera;
+}
+
+void refuse_frames(const SourceArguments& arguments) {
+  if (arguments.frames == 0) return;
+  throw InputError("--frames " + std::to_string(arguments.frames) +
+                   ": is for a simulated flight only; leave it out with a recording");
+}
+
+std::unique_ptr<FrameSource> open_recorded(const SourceArguments& arguments) {
+  refuse_frames(arguments);
+  std::optional<Camera> camera;
+  if (!arguments.camera.empty()) camera = load_camera(arguments.camera);
+  std::optional<SE3> mount;
+  if (!arguments.mount.empty()) mount = mount_from(arguments.mount);
+  return std::make_unique<RecordingSource>(arguments.name, arguments.topics, camera, mount);
+}
+}  // namespace
+
+std::unique_ptr<TumSource> open_folder(const SourceArguments& arguments) {
+  if (is_recording(arguments.name))
+    throw InputError(arguments.name + ": is a recording, and this needs a folder in the TUM RGB-D format");
   if (arguments.camera.empty()) {
     throw InputError(arguments.name +
                      ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a file");
   }
-  if (arguments.frames != 0) {
-    throw InputError("--frames " + std::to_string(arguments.frames) +
-                     ": is for a simulated flight only; leave it out with a recording");
-  }
-  Camera camera = load_camera(arguments.camera);
-  if (!arguments.mount.empty()) camera.T_body_camera = mount_from(arguments.mount);
-  return std::make_unique<TumSource>(arguments.name, camera);
+  refuse_frames(arguments);
+  return std::make_unique<TumSource>(arguments.name, with_mount(load_camera(arguments.camera), arguments));
 }
 
 std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
   std::unique_ptr<FrameSource> source;
-  if (const auto flight = simulated_flight(arguments))
+  if (const auto flight = simulated_flight(arguments)) {
     source = std::make_unique<SimulatedSource>(*flight);
-  else
-    source = open_recording(arguments);
+  } else if (is_recording(arguments.name)) {
+    source = open_recorded(arguments);
+  } else {
+    source = open_folder(arguments);
+  }
   const auto degradation = degradation_from(arguments.degrade).value_or(Degradation::kNone);
   if (degradation == Degradation::kNone) return source;
   return std::make_unique<DegradedSource>(std::move(source), degradation);

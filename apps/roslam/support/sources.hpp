@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "roslam/ros/recording_streams.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/sensors/tum_source.hpp"
 #include "simulation/simulated_options.hpp"
@@ -16,8 +17,9 @@
 namespace roslam::app {
 
 struct SourceArguments {
-  std::string name;        ///< a TUM folder or simulated:street|loop|hover|turn
-  std::string camera;      ///< a preset or a file; not needed for a simulated flight
+  std::string name;             ///< a TUM folder, a recording or simulated:street|loop|hover|turn
+  std::string camera;           ///< a preset or a file; not needed where the source knows it
+  RecordingChoice topics = {};  ///< of a recording
   std::string mount = {};  ///< of the camera on the drone: X,Y,Z,ROLL,PITCH,YAW; empty: as the camera file
   std::string traffic = "light";  ///< the rest: of a simulated flight; none, light, heavy
   std::size_t frames = 0;         ///< 0 = the whole flight
@@ -38,6 +40,9 @@ CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments);
 /// Adds the options of simulated flights: --traffic, --frames, --seed and so on.
 void add_flight_options(CLI::App& command, SourceArguments& arguments);
 
+/// Adds --colour, --depth and --truth, which choose topics of a recording; --imu is of the flight options.
+void add_topic_options(CLI::App& command, SourceArguments& arguments);
+
 /// Adds --mount.
 void add_mount_option(CLI::App& command, SourceArguments& arguments);
 
@@ -47,14 +52,15 @@ void add_degrade_option(CLI::App& command, SourceArguments& arguments);
 /// Opens the source. Throws InputError or CalibrationError.
 std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments);
 
-/// The options of a simulated flight as text, by name; empty for a recording.
+/// The options of a simulated flight, or the topics that were chosen of a recording, as text, by name.
 std::map<std::string, std::string> flight_in_words(const SourceArguments& arguments);
 
 /// The inverse; an option not in words keeps its default. Throws InputError for a value that is no number.
 SourceArguments flight_from_words(const std::string& name, const std::map<std::string, std::string>& words);
 
-/// The two kinds of sources; the flight is empty for a recording. Both throw as open_source().
+/// Kinds of sources; the flight is empty for others, and the folder must be in the TUM RGB-D format. All
+/// throw as open_source().
 std::optional<simulation::SimulatorOptions> simulated_flight(const SourceArguments& arguments);
-std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments);
+std::unique_ptr<TumSource> open_folder(const SourceArguments& arguments);
 
 }  // namespace roslam::app

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "roslam/geometry/se3.hpp"
+
+namespace roslam {
+
+/// Coordinate frames by name, each placed in its parent, as ROS tells of them (tf).
+class FrameTree {
+ public:
+  /// Places a frame; one that is there already is moved. Names are taken without a leading slash.
+  void add(const std::string& parent, const std::string& child, const SE3& T_parent_child);
+
+  /// T_a_b, or nothing if the two frames are not connected. A frame to itself is the identity, known or not.
+  std::optional<SE3> transform(const std::string& a, const std::string& b) const;
+
+ private:
+  struct Placed {
+    std::string parent;
+    SE3 T_parent_child;
+  };
+  std::map<std::string, Placed> frames_;  // by the child
+};
+
+}  // namespace roslam

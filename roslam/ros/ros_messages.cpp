@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "roslam/ros/ros_messages.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+namespace roslam {
+
+namespace {
+constexpr std::uint32_t kLargestSide = 16384;  // pixels
+
+RosHeader header_of(RosReader& reader) {
+  if (reader.encoding() == RosEncoding::kRos1) reader.get<std::uint32_t>();  // sequence number
+  RosHeader header;
+  header.stamp = reader.time();
+  header.frame = reader.text();
+  return header;
+}
+
+int side_of(std::uint32_t pixels) {
+  if (pixels > kLargestSide)
+    throw InputError("image of " + std::to_string(pixels) + " pixels a side is too large");
+  return static_cast<int>(pixels);
+}
+
+Eigen::Vector3d vector_of(RosReader& reader) {
+  const auto x = reader.get<double>(), y = reader.get<double>(), z = reader.get<double>();
+  return {x, y, z};
+}
+
+// Translation, then the quaternion x y z w.
+SE3 pose_of(RosReader& reader) {
+  const Eigen::Vector3d translation = vector_of(reader);
+  const Eigen::Vector3d imaginary = vector_of(reader);
+  const Eigen::Quaterniond rotation(reader.get<double>(), imaginary.x(), imaginary.y(), imaginary.z());
+  constexpr double kRounding = 1e-2;
+  if (!translation.allFinite() || !(std::abs(rotation.norm() - 1.0) < kRounding))
+    throw InputError("pose that is not finite or has no unit quaternion");
+  return {rotation.normalized(), translation};
+}
+}  // namespace
+
+std::string plain_type(std::string_view type) {
+  const std::size_t folder = type.find("/msg/");
+  if (folder == std::string_view::npos) return std::string(type);
+  return std::string(type.substr(0, folder)) + std::string(type.substr(folder + 4));
+}
+
+RosImage decode_image(std::span<const std::uint8_t> message, RosEncoding encoding) {
+  RosReader reader(message, encoding);
+  RosImage image;
+  image.header = header_of(reader);
+  image.height = side_of(reader.get<std::uint32_t>());
+  image.width = side_of(reader.get<std::uint32_t>());
+  image.encoding = reader.text();
+  if (reader.get<std::uint8_t>() != 0 && image.encoding.find("16") != std::string::npos)
+    throw InputError("image of big-endian pixels");
+  image.step = reader.get<std::uint32_t>();
+  image.data = reader.bytes();
+  if (image.width == 0 || image.height == 0) throw InputError("image without pixels");
+  if (image.step * static_cast<std::size_t>(image.height) > image.data.size())
+    throw InputError("image is truncated");
+  return image;
+}
+
+RosImage decode_compressed_image(std::span<const std::uint8_t> message, RosEncoding encoding) {
+  RosReader reader(message, encoding);
+  RosImage image;
+  image.is_compressed = true;
+  image.header = header_of(reader);
+  image.encoding = reader.text();
+  image.data = reader.bytes();
+  if (image.data.empty()) throw InputError("image is empty");
+  return image;
+}
+
+RosCameraInfo decode_camera_info(std::span<const std::uint8_t> message, RosEncoding encoding) {
+  RosReader reader(message, encoding);
+  RosCameraInfo info;
+  info.header = header_of(reader);
+  info.height = side_of(reader.get<std::uint32_t>());
+  info.width = side_of(reader.get<std::uint32_t>());
+  info.model = reader.text();
+  info.distortion = reader.numbers();
+  reader.get(info.K);
+  std::array<double, 9> R{};
+  reader.get(R);
+  reader.get(info.P);
+  return info;
+}
+
+RosImu decode_imu(std::span<const std::uint8_t> message, RosEncoding encoding) {
+  RosReader reader(message, encoding);
+  std::array<double, 9> covariance{};
+  RosImu imu;
+  imu.header = header_of(reader);
+  for (int i = 0; i < 4; ++i) reader.get<double>();  // orientation
+  reader.get(covariance);
+  imu.turn_rate = vector_of(reader);
+  reader.get(covariance);
+  imu.acceleration = vector_of(reader);
+  return imu;
+}
+
+std::optional<std::vector<RosTransform>> decode_transforms(std::string_view type,
+                                                           std::span<const std::uint8_t> message,
+                                                           RosEncoding encoding) {
+  const bool is_tf = type == "tf2_msgs/TFMessage" || type == "tf/tfMessage";
+  const bool is_transform = type == "geometry_msgs/TransformStamped";
+  const bool is_odometry = type == "nav_msgs/Odometry";
+  const bool is_pose =
+      type == "geometry_msgs/PoseStamped" || type == "geometry_msgs/PoseWithCovarianceStamped";
+  if (!is_tf && !is_transform && !is_odometry && !is_pose) return std::nullopt;
+  RosReader reader(message, encoding);
+  constexpr std::size_t kLeast = 56;  // bytes of a pose
+  const std::size_t count = is_tf ? reader.count(kLeast) : 1;
+  std::vector<RosTransform> result;
+  for (std::size_t i = 0; i < count; ++i) {
+    RosTransform transform;
+    transform.header = header_of(reader);
+    if (!is_pose) transform.child = reader.text();
+    transform.T_parent_child = pose_of(reader);
+    result.push_back(std::move(transform));
+  }
+  return result;
+}
+
+Camera camera_of(const RosCameraInfo& info, bool is_rectified) {
+  Camera camera;
+  camera.width = info.width;
+  camera.height = info.height;
+  camera.fx = info.K[0];
+  camera.fy = info.K[4];
+  camera.cx = info.K[2];
+  camera.cy = info.K[5];
+  if (is_rectified) {
+    camera.fx = info.P[0];
+    camera.fy = info.P[5];
+    camera.cx = info.P[2];
+    camera.cy = info.P[6];
+    camera.validate();
+    return camera;
+  }
+  const bool is_undistorted =
+      std::all_of(info.distortion.begin(), info.distortion.end(), [](double value) { return value == 0.0; });
+  // The RealSense SDK names its models itself; its own projection applies the inverse one forward
+  // (realsense-ros publishes it as plumb_bob as well).
+  const bool is_brown = info.model == "plumb_bob" || info.model == "Brown Conrady" ||
+                        info.model == "Inverse Brown Conrady" || info.model == "Modified Brown Conrady";
+  if (!is_undistorted) {
+    if (!is_brown || info.distortion.size() > camera.distortion.size())
+      throw CalibrationError("camera_info has a lens of the model '" + info.model +
+                             "', which is not supported; give a camera with --camera");
+    std::copy(info.distortion.begin(), info.distortion.end(), camera.distortion.begin());
+  }
+  camera.validate();
+  return camera;
+}
+
+double seconds_of(std::int64_t nanoseconds) {
+  constexpr std::int64_t kSecond = 1000000000;
+  std::array<char, 48> text{};
+  const bool is_negative = nanoseconds < 0;
+  const std::uint64_t size =
+      is_negative ? 0 - static_cast<std::uint64_t>(nanoseconds) : static_cast<std::uint64_t>(nanoseconds);
+  const int length = std::snprintf(text.data(), text.size(), "%s%llu.%09llu", is_negative ? "-" : "",
+                                   static_cast<unsigned long long>(size / kSecond),
+                                   static_cast<unsigned long long>(size % kSecond));
+  double seconds = 0.0;
+  std::from_chars(text.data(), text.data() + length, seconds);
+  return seconds;
+}
+
+}  // namespace roslam
