@@ -12,11 +12,15 @@ set(ROSLAM_PUBLIC_HEADERS
   geometry/mount.hpp
   geometry/se3.hpp
   geometry/trajectory.hpp
+  sensors/counts.hpp
+  sensors/frame_images.hpp
   sensors/frame_source.hpp
   sensors/image_file.hpp
   sensors/inertial_sample.hpp
   sensors/timed_files.hpp
   sensors/tum_source.hpp
+  datasets/dataset.hpp
+  datasets/folder_source.hpp
   features/descriptor.hpp
   features/feature_grid.hpp
   features/feature_options.hpp
