@@ -138,6 +138,7 @@ inline Eigen::Vector4d sample(const Frame& frame, const Eigen::Vector2d& at) {  
 inline Contradiction compare(const PaintedPlane& plane, const Camera& camera, const Frame& a,
                              const Frame& b) {
   Contradiction worst;
+  if (a.depth.empty() || b.depth.empty()) return worst;
   for (int y = 1; y < camera.height; y += std::max(2, camera.height / 24)) {
     for (int x = 1; x < camera.width; x += std::max(2, camera.width / 24)) {
       const double z = a.depth.at<float>(y, x);

@@ -37,8 +37,8 @@ void FolderSource::drop_frames_out_of_order() {
   std::vector<ListedFrame> kept;
   kept.reserve(listing_.frames.size());
   for (ListedFrame& frame : listing_.frames) {
-    const bool is_later =
-        kept.empty() || frame.segment > kept.back().segment || frame.timestamp > kept.back().timestamp;
+    const bool is_later = kept.empty() || frame.segment > kept.back().segment ||
+                          (frame.segment == kept.back().segment && frame.timestamp > kept.back().timestamp);
     if (!std::isfinite(frame.timestamp)) {
       ++images_.skipped["colour image without a time"];
     } else if (!is_later) {
