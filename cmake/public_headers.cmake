@@ -13,6 +13,8 @@ set(ROSLAM_PUBLIC_HEADERS
   geometry/se3.hpp
   geometry/trajectory.hpp
   sensors/depth_registration.hpp
+  sensors/counts.hpp
+  sensors/frame_images.hpp
   sensors/frame_source.hpp
   sensors/image_file.hpp
   sensors/inertial_sample.hpp
@@ -26,6 +28,8 @@ set(ROSLAM_PUBLIC_HEADERS
   ros/ros_images.hpp
   ros/ros_messages.hpp
   ros/ros_reader.hpp
+  datasets/dataset.hpp
+  datasets/folder_source.hpp
   features/descriptor.hpp
   features/feature_grid.hpp
   features/feature_options.hpp

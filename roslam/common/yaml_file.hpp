@@ -6,9 +6,11 @@
 #include <filesystem>
 #include <string>
 
+#include "roslam/common/export.hpp"
+
 namespace roslam {
 
 /// Reads a YAML file. Throws InputError naming the file; if_missing: the message if it cannot be opened.
-YAML::Node load_yaml(const std::filesystem::path& file, const std::string& if_missing);
+ROSLAM_EXPORT YAML::Node load_yaml(const std::filesystem::path& file, const std::string& if_missing);
 
 }  // namespace roslam

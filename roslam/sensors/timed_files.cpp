@@ -283,4 +283,26 @@ OrderedFiles in_order_of_time(std::vector<TimedFile> entries) {
   return ordered;
 }
 
+TimeUnit convert_to_seconds(const std::vector<TimedFileList*>& lists, double fps, Counts& notes) {
+  const TimeUnit unit = time_unit_of(lists.front()->entries, fps);
+  if (unit.seconds == 1.0) return unit;
+  ++notes["timestamps are " + std::string(unit.name) + " by the camera's fps; converted to seconds"];
+  for (TimedFileList* list : lists) {
+    for (auto& entry : list->entries) entry.timestamp *= unit.seconds;
+  }
+  return unit;
+}
+
+std::vector<TimedFile> ordered_entries(const std::string& name, const std::string& kind, TimedFileList list,
+                                       Counts& notes, Counts& skipped) {
+  OrderedFiles files = in_order_of_time(std::move(list.entries));
+  if (!files.was_sorted) ++notes[name + " was not in the order of time; sorted"];
+  count(notes, "the clock restarts in " + name + "; a new segment begins there",
+        static_cast<std::size_t>(files.restarts));
+  count(skipped, kind + " without a time", list.without_time);
+  count(skipped, kind + " with the time of another", files.repeated);
+  count(skipped, kind + " with a time that does not fit the others", files.implausible);
+  return std::move(files.entries);
+}
+
 }  // namespace roslam

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "roslam/common/export.hpp"
+#include "roslam/sensors/counts.hpp"
 
 namespace roslam {
 
@@ -56,5 +57,14 @@ struct OrderedFiles {
 /// segment begins. A line that is out of order is left out where its time does not fit between others, as
 /// that of a corrupt timestamp.
 OrderedFiles in_order_of_time(std::vector<TimedFile> entries);
+
+/// Converts the times of lists of one clock to seconds. The unit is that of the first list by the camera's
+/// fps; where it is not seconds, a note says so. Returns it.
+TimeUnit convert_to_seconds(const std::vector<TimedFileList*>& lists, double fps, Counts& notes);
+
+/// The entries of a list in the order of time. name: of the list, kind: of its images, for the messages.
+/// Lines that are left out are counted in skipped; notes says what was sorted and where the clock restarts.
+std::vector<TimedFile> ordered_entries(const std::string& name, const std::string& kind, TimedFileList list,
+                                       Counts& notes, Counts& skipped);
 
 }  // namespace roslam

@@ -7,23 +7,15 @@
 #include <utility>
 
 #include "roslam/common/error.hpp"
-#include "roslam/sensors/image_file.hpp"
+#include "roslam/sensors/ground_truth.hpp"
 
 namespace roslam {
 
 namespace {
-std::string size_in_words(const cv::Size& size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
 std::string in_words(double fps) {
   char text[32];
   std::snprintf(text, sizeof(text), "%.3g", fps);
   return text;
-}
-
-void count(std::map<std::string, std::size_t>& counts, const std::string& reason, std::size_t number) {
-  if (number > 0) counts[reason] += number;
 }
 }  // namespace
 
@@ -78,7 +70,7 @@ bool TumSource::recognises(const std::filesystem::path& folder) {
 }
 
 TumSource::TumSource(const std::filesystem::path& folder, const Camera& camera, const TumOptions& options)
-    : folder_(folder), camera_(camera) {
+    : folder_(folder), camera_(camera), options_(options) {
   options.validate();
   camera.validate();
   if (!std::filesystem::is_directory(folder)) {
@@ -89,23 +81,18 @@ TumSource::TumSource(const std::filesystem::path& folder, const Camera& camera, 
                            std::string(usual_depth_units()));
   }
   open_lists();
-  pair_with_depth(options.max_time_difference);
+  pair_with_depth();
 }
 
 void TumSource::open_lists() {
   TimedFileList colour = read_timed_files(folder_ / "rgb.txt");
   TimedFileList depth = read_timed_files(folder_ / "depth.txt");
   size_ = colour.entries.size() + colour.without_time;
-  const TimeUnit unit = time_unit_of(colour.entries, camera_.fps);
-  if (unit.seconds != 1.0) {
-    ++notes_["timestamps are " + std::string(unit.name) + " by the camera's fps; converted to seconds"];
-    for (TimedFileList* list : {&colour, &depth}) {
-      for (auto& entry : list->entries) entry.timestamp *= unit.seconds;
-    }
-  }
-  colour_ = ordered("rgb.txt", "colour image", std::move(colour), skipped_);
-  depth_ = ordered("depth.txt", "depth image", std::move(depth), skipped_depth_);
-  open_inertial(unit.seconds);
+  const double seconds = convert_to_seconds({&colour, &depth}, camera_.fps, notes_).seconds;
+  colour_ = ordered_entries("rgb.txt", "colour image", std::move(colour), notes_, images_.skipped);
+  depth_ = ordered_entries("depth.txt", "depth image", std::move(depth), notes_, images_.skipped_depth);
+  open_inertial(seconds);
+  open_ground_truth(seconds);
   const double interval = median_interval(colour_);
   constexpr double kContradiction = 1.5;
   const double fps = interval > 0.0 ? 1.0 / interval : camera_.fps;
@@ -136,27 +123,23 @@ void TumSource::open_inertial(double seconds) {
     ++notes_["imu.txt has no sample in the time of the images; its times must be of their clock and unit"];
 }
 
+void TumSource::open_ground_truth(double seconds) {
+  const auto file = folder_ / "groundtruth.txt";
+  if (!options_.ground_truth || !std::filesystem::exists(file)) return;
+  if (colour_.back().segment > 0) {
+    ++notes_["groundtruth.txt is not used, as the clock restarts"];
+    return;
+  }
+  truth_ = read_ground_truth(file, seconds, notes_);
+}
+
 // The samples up to the time of a frame.
 void TumSource::take_inertial(Frame& frame) {
   while (next_inertial_ < inertial_.size() && inertial_[next_inertial_].timestamp <= frame.timestamp)
     frame.inertial.push_back(inertial_[next_inertial_++]);
 }
 
-// The lines of a list in order.
-std::vector<TimedFile> TumSource::ordered(const char* name, const char* kind, TimedFileList list,
-                                          std::map<std::string, std::size_t>& skipped) {
-  OrderedFiles files = in_order_of_time(std::move(list.entries));
-  if (!files.was_sorted) ++notes_[std::string(name) + " was not in the order of time; sorted"];
-  if (files.restarts > 0)
-    notes_[std::string("the clock restarts in ") + name + "; a new segment begins there"] +=
-        static_cast<std::size_t>(files.restarts);
-  count(skipped, std::string(kind) + " without a time", list.without_time);
-  count(skipped, std::string(kind) + " with the time of another", files.repeated);
-  count(skipped, std::string(kind) + " with a time that does not fit the others", files.implausible);
-  return std::move(files.entries);
-}
-
-void TumSource::pair_with_depth(double max_time_difference) {
+void TumSource::pair_with_depth() {
   const auto segments = [](const std::vector<TimedFile>& files) { return files.back().segment + 1; };
   if (segments(colour_) != segments(depth_)) {
     throw InputError(folder_.string() + ": the clock restarts " + std::to_string(segments(colour_) - 1) +
@@ -171,15 +154,14 @@ void TumSource::pair_with_depth(double max_time_difference) {
       return std::pair(static_cast<int>(begin - files.begin()), std::vector<TimedFile>(begin, end));
     };
     const auto [first_depth, depth] = part(depth_);
-    for (const int index : associate_by_time(part(colour_).second, depth, max_time_difference))
+    for (const int index : associate_by_time(part(colour_).second, depth, options_.max_time_difference))
       depth_of_colour_.push_back(index < 0 ? -1 : first_depth + index);
   }
 }
 
 std::map<std::string, std::size_t> TumSource::notes() const {
   auto notes = notes_;
-  if (bits_ > 8) ++notes["colour images of " + std::to_string(bits_) + " bits a channel were reduced to 8"];
-  count(notes, "depth pixel at the end of the sensor's range, taken as unknown", saturated_depth_pixels_);
+  images_.add_to(notes);
   return notes;
 }
 
@@ -191,48 +173,20 @@ std::optional<Frame> TumSource::next() {
 }
 
 std::optional<Frame> TumSource::read(std::size_t index) {
-  const ImageFile colour = read_colour_image(folder_ / colour_[index].file, bits_);
-  if (!colour.error.empty()) {
-    ++skipped_["colour image " + colour.error];
-    return std::nullopt;
-  }
-  const cv::Size expected(camera_.width, camera_.height);
-  if (colour.image.size() != expected) {
-    ++skipped_["colour image is " + size_in_words(colour.image.size()) + " but the camera " +
-               size_in_words(expected) + " pixels"];
-    return std::nullopt;
-  }
-  bits_ = std::max(bits_, colour.bits);
   Frame frame;
+  frame.colour = images_.colour(folder_ / colour_[index].file, {camera_.width, camera_.height});
+  if (frame.colour.empty()) return std::nullopt;
   frame.index = index;
   frame.segment = colour_[index].segment;
   frame.timestamp = colour_[index].timestamp;
-  frame.colour = colour.image;
-  frame.depth = read_depth_for(index, colour.image.size());
+  if (const auto file = depth_file(index)) {
+    frame.depth = images_.depth(*file, camera_.depth_units_per_metre, frame.colour.size());
+  } else {
+    ++images_.skipped_depth["no depth image near in time"];
+  }
+  frame.T_world_camera = true_pose_at(truth_, frame.timestamp);
   take_inertial(frame);
   return frame;
-}
-
-cv::Mat TumSource::read_depth_for(std::size_t index, const cv::Size& colour_size) {
-  if (depth_of_colour_[index] < 0) {
-    ++skipped_depth_["no depth image near in time"];
-    return {};
-  }
-  const auto& entry = depth_[static_cast<std::size_t>(depth_of_colour_[index])];
-  const ImageFile depth = read_depth_image(folder_ / entry.file);
-  if (!depth.error.empty()) {
-    ++skipped_depth_["depth image " + depth.error];
-    return {};
-  }
-  if (depth.image.size() != colour_size) {
-    ++skipped_depth_["depth image is " + size_in_words(depth.image.size()) + " but the colour image " +
-                     size_in_words(colour_size) + " pixels"];
-    return {};
-  }
-  std::size_t saturated = 0;
-  cv::Mat metres = depth_to_metres(depth.image, camera_.depth_units_per_metre, &saturated);
-  saturated_depth_pixels_ += saturated;
-  return metres;
 }
 
 }  // namespace roslam

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "roslam/common/export.hpp"
+#include "roslam/geometry/trajectory.hpp"
+#include "roslam/sensors/frame_images.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/sensors/timed_files.hpp"
 
@@ -15,6 +17,7 @@ namespace roslam {
 
 struct ROSLAM_EXPORT TumOptions {
   double max_time_difference = 0.02;  ///< seconds between a colour image and the depth image paired with it
+  bool ground_truth = false;          ///< frames carry the poses of groundtruth.txt, where the folder has it
 
   /// Throws OptionsError naming the field.
   void validate() const;
@@ -48,8 +51,8 @@ class ROSLAM_EXPORT TumSource : public FrameSource {
   std::optional<Frame> next() override;
   const Camera& camera() const override { return camera_; }
   std::optional<std::size_t> size() const override { return size_; }
-  std::map<std::string, std::size_t> skipped() const override { return skipped_; }
-  std::map<std::string, std::size_t> skipped_depth() const override { return skipped_depth_; }
+  std::map<std::string, std::size_t> skipped() const override { return images_.skipped; }
+  std::map<std::string, std::size_t> skipped_depth() const override { return images_.skipped_depth; }
   std::map<std::string, std::size_t> notes() const override;
 
   /// The file of a frame's colour image. index: of a frame returned by next().
@@ -63,28 +66,25 @@ class ROSLAM_EXPORT TumSource : public FrameSource {
 
  private:
   void open_lists();
-  std::vector<TimedFile> ordered(const char* name, const char* kind, TimedFileList list,
-                                 std::map<std::string, std::size_t>& skipped);
-  void pair_with_depth(double max_time_difference);
+  void pair_with_depth();
   std::optional<Frame> read(std::size_t index);
   void open_inertial(double seconds);
+  void open_ground_truth(double seconds);
   void take_inertial(Frame& frame);
-  cv::Mat read_depth_for(std::size_t index, const cv::Size& colour_size);
 
   std::filesystem::path folder_;
   Camera camera_;
+  TumOptions options_;
   std::vector<TimedFile> colour_;
   std::vector<TimedFile> depth_;
   std::vector<int> depth_of_colour_;
-  std::map<std::string, std::size_t> skipped_;
-  std::map<std::string, std::size_t> skipped_depth_;
-  std::map<std::string, std::size_t> notes_;
-  std::size_t size_ = 0;                    // colour images listed
-  int bits_ = 8;                            // of a channel of the colour images so far
-  std::size_t saturated_depth_pixels_ = 0;  // taken as unknown
+  FrameImages images_;
+  Counts notes_;
+  std::size_t size_ = 0;  // colour images listed
   std::size_t position_ = 0;
   std::vector<InertialSample> inertial_;
   std::size_t next_inertial_ = 0;
+  Trajectory truth_;
 };
 
 }  // namespace roslam
