@@ -168,7 +168,7 @@ TEST(RecordingWriters, WriteWhatOthersRead) {
     const int numbers = writer.add_topic("/numbers", "std_msgs/UInt32", "uint32 data");
     const int words = writer.add_topic("/words", "std_msgs/String", "string data");
     for (std::uint32_t i = 0; i < 500; ++i) {
-      const std::string data = BagWriter::bits(i);
+      const std::string data = bits(i);
       writer.write(i % 4 == 0 ? words : numbers, 1'600'000'000'000'000'000 + i * 7,
                    {reinterpret_cast<const std::uint8_t*>(data.data()), data.size()});
     }

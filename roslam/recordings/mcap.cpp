@@ -18,6 +18,7 @@ constexpr std::size_t kMaxChunkHeader = 256;
 constexpr std::uint64_t kMaxSummaryBytes = std::uint64_t{256} << 20;
 constexpr std::uint64_t kRunBytes = std::uint64_t{4}
                                     << 20;  // messages outside chunks that are loaded at once
+constexpr std::size_t kMaxSchemaName = 1024;
 constexpr std::size_t kMaxSchemaBytes = std::size_t{64} << 20;
 constexpr const char* kDamagedChunk = "damaged chunk, left out";
 
@@ -165,10 +166,10 @@ bool McapFile::add_schema(ByteSpan content) {
   schema.name = cursor.text();
   cursor.text();
   schema.definition = cursor.text();
-  if (!cursor.ok() || id == 0) return false;
+  if (!cursor.ok() || id == 0 || schema.name.size() > kMaxSchemaName) return false;
   if (schemas_.contains(id)) return true;  // it may be repeated, not changed
-  schema_bytes_ += schema.name.size() + schema.definition.size();
-  if (schema_bytes_ > kMaxSchemaBytes) schema.definition.clear();
+  if (schema.definition.size() > kMaxSchemaBytes - schema_bytes_) schema.definition.clear();
+  schema_bytes_ += schema.definition.size();
   schemas_.emplace(id, std::move(schema));
   return true;
 }
