@@ -68,7 +68,7 @@ class ChunkedRecording : public Recording {
   /// Loads a chunk that no index describes, for its topics and times, and adds it. run: as in Chunk.
   void add_unindexed(std::uint64_t offset, std::size_t run);
   void add(Chunk chunk);
-  /// To be called once, when all chunks are added.
+  /// To be called once, when all chunks are added. Throws InputError if a library is missing that they need.
   void finish_opening();
   /// Forgets all chunks, to begin anew without the index.
   void clear_chunks() { chunks_.clear(); }

@@ -103,7 +103,6 @@ RosBag::RosBag(const std::filesystem::path& path) : ChunkedRecording(path) {
   const auto offset = index_offset();
   if (!offset || !read_index(*offset)) scan();
   finish_opening();
-  require_first_chunk();
 }
 
 // Where the index is, or nothing with a note if there is none.
@@ -225,16 +224,6 @@ void RosBag::scan() {
     at = end;
   }
   end_run();
-}
-
-// A library that is missing is found out when the file is opened.
-void RosBag::require_first_chunk() {
-  const auto head = head_at(file_, kMagic.size());
-  if (!head) return;
-  if (const auto chunk = head_at(file_, head->end()); chunk && chunk->operation == kChunk) {
-    const auto method = compression_named(field(chunk->header, "compression").value_or("none"));
-    if (method) require_compression(*method, file_.name());
-  }
 }
 
 std::optional<ChunkedRecording::PackedChunk> RosBag::chunk_at(std::uint64_t offset) {
