@@ -31,6 +31,9 @@ class ChunkedRecording : public Recording {
  protected:
   explicit ChunkedRecording(const std::filesystem::path& path) : file_(path), topics_(file_.name()) {}
 
+  /// Messages outside chunks are loaded in runs of so many bytes, or one by one if they are larger.
+  static constexpr std::uint64_t kRunBytes = std::uint64_t{4} << 20;
+
   /// A part of the file that is loaded at once.
   struct Chunk {
     std::uint64_t offset = 0;                // in the file, of its record

@@ -12,8 +12,6 @@ namespace {
 constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
 constexpr std::size_t kMaxHeader = 8192;  // of a record; holds the name of a topic at most
 constexpr std::uint64_t kMaxIndexBytes = std::uint64_t{256} << 20;
-constexpr std::uint64_t kRunBytes = std::uint64_t{4}
-                                    << 20;  // messages outside chunks that are loaded at once
 constexpr const char* kDamagedRecord = "damaged record; what follows it was left out";
 constexpr const char* kUndescribed = "message of a topic that the file does not describe, left out";
 
