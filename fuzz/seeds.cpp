@@ -11,6 +11,7 @@
 #include "roslam/occupancy/occupancy_map.hpp"
 #include "roslam/options/options.hpp"
 #include "tests/onnx_writer.hpp"
+#include "tests/recording_writers.hpp"
 
 namespace {
 using namespace roslam;
@@ -85,6 +86,44 @@ std::string small_network() {
       .node("ConvTranspose", {"n", "t"}, "out", {{"kernel_shape", {2, 2}}, {"strides", {2, 2}}});
   return writer.file("in", 3, "out");
 }
+// Two topics, several chunks, messages of either.
+void write_recording(RecordingWriter& writer) {
+  const int image = writer.add_topic("/image", "sensor_msgs/Image", "uint8[] data");
+  const int imu = writer.add_topic("/imu", "sensor_msgs/Imu", "");
+  for (int i = 0; i < 12; ++i) {
+    const std::vector<std::uint8_t> data(static_cast<std::size_t>(10 + 7 * i), static_cast<std::uint8_t>(i));
+    writer.write(i % 3 == 0 ? image : imu, 1'000'000'000 + (i ^ 3) * 1000, data);
+  }
+}
+
+// One of each kind. Those that are not closed have no index.
+void write_recordings(const std::filesystem::path& folder) {
+  for (const char* parser : {"ros_bag", "mcap", "sqlite"}) make_folder(folder / parser);
+  for (const std::string method : {"none", "lz4", "bz2"}) {
+    BagWriter closed(folder / "ros_bag" / method, {method, 300});
+    write_recording(closed);
+    closed.close();
+    BagWriter cut(folder / "ros_bag" / (method + "_cut"), {method, 300});
+    write_recording(cut);
+  }
+  for (const std::string method : {"none", "lz4", "zstd", "unchunked"}) {
+    McapOptions options(method);
+    options.chunk_bytes = 300;
+    options.has_chunks = method != "unchunked";
+    options.has_crcs = false;  // else a damaged chunk is never looked into
+    McapWriter closed(folder / "mcap" / method, options);
+    write_recording(closed);
+    closed.close();
+    McapWriter cut(folder / "mcap" / (method + "_cut"), options);
+    write_recording(cut);
+  }
+  for (const bool compresses : {false, true}) {
+    Db3Writer writer(folder / "sqlite" / (compresses ? "zstd" : "plain"),
+                     {compresses, compresses, compresses});
+    write_recording(writer);
+    writer.close();
+  }
+}
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -115,6 +154,7 @@ int main(int count, char** arguments) {
     make_folder(folder / "occupancy");
     occupancy.write(folder / "occupancy" / "states.bt");
     occupancy.write(folder / "occupancy" / "probabilities.ot");
+    write_recordings(folder);
   } catch (const Error& error) {
     std::fprintf(stderr, "error: %s\n", error.what());
     return 1;

@@ -3,14 +3,13 @@
 #include "roslam/recordings/recording.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <algorithm>
-#include <fstream>
 #include <functional>
 #include <random>
 
 #include "roslam/common/error.hpp"
+#include "tests/recorded_messages.hpp"
 #include "tests/recording_writers.hpp"
 #include "tests/scratch.hpp"
 
@@ -20,22 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kStart = 1'700'000'000'123'456'789;
-
-struct Message {
-  std::string topic;
-  std::int64_t time;
-  std::string data;
-  bool operator==(const Message&) const = default;
-};
-
-std::vector<Message> read_all(Recording& recording) {
-  std::vector<Message> messages;
-  while (const auto message = recording.next()) {
-    messages.push_back({recording.topics().at(static_cast<std::size_t>(message->topic)).name, message->time,
-                        std::string(message->data.begin(), message->data.end())});
-  }
-  return messages;
-}
 
 bool is_sorted_by_time(const std::vector<Message>& messages) {
   return std::is_sorted(messages.begin(), messages.end(),
@@ -49,17 +32,6 @@ std::string random_data(std::mt19937& random, std::size_t max_size) {
   for (std::size_t i = 0; i < size; ++i) data += static_cast<char>(random() % 16);
   return data;
 }
-
-std::span<const std::uint8_t> bytes_of(const std::string& text) {
-  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
-}
-
-std::string bytes_of_file(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-void put(const fs::path& file, std::string_view bytes) { std::ofstream(file, std::ios::binary) << bytes; }
 
 struct Format {
   std::string name;
@@ -207,180 +179,6 @@ TEST_P(Recordings, DamagedBytesAreSurvived) {
 
 INSTANTIATE_TEST_SUITE_P(Formats, Recordings, testing::ValuesIn(formats()),
                          [](const auto& test) { return test.param.name; });
-
-class RecordingChunks : public testing::Test {
- protected:
-  void TearDown() override { fs::remove_all(file_); }
-
-  // Chunk after chunk, each of messages at these times.
-  template <typename Writer>
-  void write_chunks(const std::vector<std::vector<int>>& chunks, bool closes = true) {
-    Writer writer(file_);
-    const int topic = writer.add_topic("/t", "std_msgs/String", "string data");
-    for (const auto& times : chunks) {
-      for (const int time : times) writer.write(topic, time, bytes_of(std::to_string(number_++)));
-      writer.end_chunk();
-    }
-    if (closes) writer.close();
-  }
-
-  std::vector<std::pair<int, int>> times_and_numbers() {
-    const auto recording = open_recording(file_);
-    std::vector<std::pair<int, int>> read;
-    for (const Message& message : read_all(*recording))
-      read.emplace_back(static_cast<int>(message.time), std::stoi(message.data));
-    return read;
-  }
-
-  const fs::path file_ = scratch_path();
-  int number_ = 0;
-};
-
-TEST_F(RecordingChunks, OverlappingAndUnsortedChunksAreMerged) {
-  const std::vector<std::vector<int>> chunks{{50, 40, 60}, {10, 55, 20}, {}, {5, 100}, {20, 20}, {40, 60}};
-  // Of equal times, the one that is first in the file.
-  const std::vector<std::pair<int, int>> expected{{5, 6},   {10, 3}, {20, 5}, {20, 8}, {20, 9},  {40, 1},
-                                                  {40, 10}, {50, 0}, {55, 4}, {60, 2}, {60, 11}, {100, 7}};
-  for (const bool closes : {true, false}) {
-    number_ = 0;
-    write_chunks<BagWriter>(chunks, closes);
-    EXPECT_EQ(times_and_numbers(), expected) << closes;
-    number_ = 0;
-    write_chunks<McapWriter>(chunks, closes);
-    EXPECT_EQ(times_and_numbers(), expected) << closes;
-  }
-}
-
-TEST_F(RecordingChunks, SeveralPublishersOfATopicAreOne) {
-  BagWriter writer(file_);
-  const int first = writer.add_topic("/tf", "tf2_msgs/TFMessage", "");
-  const int second = writer.add_topic("/tf", "tf2_msgs/TFMessage", "");
-  const int other = writer.add_topic("/tf", "tf/tfMessage", "");
-  for (const int topic : {first, second, other, second}) writer.write(topic, topic, bytes_of("x"));
-  writer.close();
-  const auto recording = open_recording(file_);
-  ASSERT_EQ(recording->topics().size(), 2u);
-  EXPECT_EQ(recording->topics()[0].messages, 3u);
-  EXPECT_EQ(recording->topics()[1].type, "tf/tfMessage");
-  recording->select({0});
-  EXPECT_EQ(read_all(*recording).size(), 3u);
-}
-
-TEST_F(RecordingChunks, ADamagedChunkIsLeftOutAndCounted) {
-  for (const std::string method : {"none", "lz4", "zstd"}) {
-    McapWriter writer(file_, McapOptions(method));
-    const int topic = writer.add_topic("/t", "std_msgs/msg/String", "");
-    for (int i = 0; i < 3; ++i) {
-      writer.write(topic, i, bytes_of("chunk " + std::to_string(i) + std::string(100, 'x')));
-      writer.end_chunk();
-    }
-    writer.close();
-    std::string bytes = bytes_of_file(file_);
-    bytes[bytes.find("chunk 1") + 3] ^= 1;  // a literal of the compressed data
-    put(file_, bytes);
-    const auto recording = open_recording(file_);
-    const auto messages = read_all(*recording);
-    ASSERT_EQ(messages.size(), 2u) << method;
-    EXPECT_EQ(messages[1].data.substr(0, 7), "chunk 2");
-    EXPECT_EQ(recording->notes(), (std::map<std::string, std::size_t>{{"damaged chunk, left out", 1}}));
-  }
-}
-
-// Messages between chunks are not in the index of chunks.
-TEST_F(RecordingChunks, MessagesBesideTheChunksOfAnMcapFileAreFound) {
-  write_chunks<McapWriter>({{10, 30}, {20, 40}});
-  std::string bytes = bytes_of_file(file_);
-  const std::string loose = McapWriter::record(
-      0x05, McapWriter::bits(std::uint16_t{0}) + McapWriter::bits(std::uint32_t{9}) +
-                McapWriter::bits(std::uint64_t{25}) + McapWriter::bits(std::uint64_t{25}) + "77");
-  const std::string data_end = McapWriter::record(0x0f, McapWriter::bits(std::uint32_t{0}));
-  // The summary moves, and its checksum is no longer known.
-  const std::size_t at = bytes.find(data_end);
-  const std::size_t footer = bytes.size() - 8 - 20;
-  std::uint64_t summary = 0;
-  std::memcpy(&summary, &bytes[footer], 8);
-  summary += loose.size();
-  std::memcpy(&bytes[footer], &summary, 8);
-  std::memset(&bytes[footer + 16], 0, 4);
-  bytes.insert(at, loose);
-  put(file_, bytes);
-  EXPECT_EQ(times_and_numbers(),
-            (std::vector<std::pair<int, int>>{{10, 0}, {20, 2}, {25, 77}, {30, 1}, {40, 3}}));
-  EXPECT_TRUE(open_recording(file_)->notes().empty());
-}
-
-// A chunk that claims to unpack to nearly 4 GB, and one to as much as its claim allows: memory is not taken.
-TEST_F(RecordingChunks, AnAbsurdSizeIsLeftOut) {
-  for (const std::string method : {"none", "lz4", "bz2"}) {
-    BagWriter writer(file_, {method});
-    const int topic = writer.add_topic("/t", "std_msgs/String", "");
-    writer.write(topic, 1, bytes_of("first"));
-    writer.end_chunk();
-    writer.write(topic, 2, bytes_of("second"));
-    writer.close();
-    std::string bytes = bytes_of_file(file_);
-    const std::string name("size=", 5);
-    const std::uint32_t claimed = 0xfffffff0;
-    std::memcpy(&bytes[bytes.find(name) + name.size()], &claimed, 4);
-    put(file_, bytes);
-    const auto recording = open_recording(file_);
-    const auto messages = read_all(*recording);
-    ASSERT_EQ(messages.size(), 1u) << method;
-    EXPECT_EQ(messages[0].data, "second");
-    EXPECT_EQ(recording->notes().count("chunk with an implausible size, left out"), 1u);
-  }
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  EXPECT_LT(usage.ru_maxrss, 1 << 20) << "kB";
-}
-
-std::size_t resident_kilobytes(const char* field) {
-  std::ifstream in("/proc/self/status");
-  std::string word;
-  while (in >> word) {
-    std::size_t value = 0;
-    if (word == field && in >> value) return value;
-  }
-  return 0;
-}
-
-// Peak memory over what the process had before.
-template <typename Writer>
-void expect_bounded_memory(const fs::path& file, typename Writer::Options options, bool closes) {
-  constexpr int kMessages = 400;
-  std::string image(512 * 1024, '\0');
-  std::mt19937 random(1);
-  for (std::size_t i = 0; i < image.size(); i += 4) {
-    const auto bits = random();
-    std::memcpy(&image[i], &bits, 4);
-  }
-  {
-    Writer writer(file, options);
-    const int topic = writer.add_topic("/image", "sensor_msgs/Image", "");
-    for (int i = 0; i < kMessages; ++i) writer.write(topic, kStart + i * 1000, bytes_of(image));
-    if (closes) writer.close();
-  }
-  ASSERT_GT(fs::file_size(file), std::uintmax_t{200} << 20);
-  std::ofstream("/proc/self/clear_refs") << 5;  // begins the peak anew
-  const std::size_t before = resident_kilobytes("VmRSS:");
-  const auto recording = open_recording(file);
-  int count = 0;
-  while (const auto message = recording->next())
-    count += std::equal(message->data.begin(), message->data.end(), bytes_of(image).begin()) ? 1 : 0;
-  EXPECT_EQ(count, kMessages);
-  ASSERT_GT(before, 0u);
-  EXPECT_LT(resident_kilobytes("VmHWM:"), before + 100 * 1024);
-}
-
-TEST_F(RecordingChunks, MemoryDoesNotGrowWithTheFile) {
-  expect_bounded_memory<BagWriter>(file_, {"lz4"}, true);
-  expect_bounded_memory<BagWriter>(file_, {"none"}, false);
-  McapOptions unchunked;
-  unchunked.has_chunks = false;
-  expect_bounded_memory<McapWriter>(file_, McapOptions("zstd"), true);
-  expect_bounded_memory<McapWriter>(file_, unchunked, true);
-  expect_bounded_memory<Db3Writer>(file_, {.has_time_index = false}, true);
-}
 
 }  // namespace
 }  // namespace roslam

@@ -23,6 +23,8 @@
 #include "roslam/common/error.hpp"
 #include "roslam/common/stopwatch.hpp"
 #include "roslam/common/write_file.hpp"
+#include "roslam/datasets/dataset.hpp"
+#include "roslam/datasets/folder_source.hpp"
 #include "roslam/options/settings.hpp"
 #include "roslam/ros/recording_source.hpp"
 #include "roslam/sensors/tum_source.hpp"
@@ -63,12 +65,17 @@ std::unique_ptr<FrameSource> open_source_of(const RecordedRun& run) {
   if (is_recording(run.source()))
     return std::make_unique<RecordingSource>(
         run.source(), flight_from_words(run.source(), run.flight()).topics, run.camera());
+  if (!TumSource::recognises(run.source()) && dataset_format(run.source()))
+    return open_dataset(run.source(), run.camera());
   return std::make_unique<TumSource>(run.source(), run.camera());
 }
 
 std::string name_of_files(const FrameSource& source, const Frame& frame) {
-  const auto* recording = dynamic_cast<const TumSource*>(&source);
-  return recording ? recording->colour_file(frame.index).stem().string() : time_text(frame.timestamp);
+  if (const auto* folder = dynamic_cast<const TumSource*>(&source))
+    return folder->colour_file(frame.index).stem().string();
+  if (const auto* folder = dynamic_cast<const FolderSource*>(&source))
+    return folder->files(frame.index).colour.stem().string();
+  return time_text(frame.timestamp);
 }
 
 std::shared_ptr<Inpainter> inpainter_for(const RestoreArguments& arguments,

@@ -5,12 +5,14 @@
 // Structure sensor takes 30 a second.
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <opencv2/imgproc.hpp>
 
 #include "roslam/common/error.hpp"
 #include "roslam/datasets/formats.hpp"
 #include "roslam/datasets/numbered_poses.hpp"
 #include "roslam/datasets/text_numbers.hpp"
+#include "roslam/sensors/depth_registration.hpp"
 #include "roslam/sensors/image_file.hpp"
 
 namespace roslam::datasets {
@@ -88,28 +90,6 @@ bool agree(const Camera& depth, const Camera& colour, const SE3& T_colour_depth)
   return true;
 }
 
-// Brings depth to the colour image: each pixel to the nearest one of its point; of several the nearest point
-// wins. To be replaced by the general registration of depth, which leaves no gaps between pixels.
-cv::Mat reprojected(const cv::Mat& depth, const Camera& from, const Camera& to, const SE3& T_to_from) {
-  cv::Mat result = cv::Mat::zeros(to.height, to.width, CV_32FC1);
-  for (int y = 0; y < depth.rows; ++y) {
-    for (int x = 0; x < depth.cols; ++x) {
-      const float z = depth.at<float>(y, x);
-      if (!(z > 0.0F)) continue;
-      const Eigen::Vector3d point = T_to_from * from.unproject({x, y}, z);
-      if (!(point.z() > 0.0)) continue;
-      const Eigen::Vector2d pixel = to.distort(to.project(point));
-      if (!(pixel.x() > -0.5 && pixel.y() > -0.5 && pixel.x() < to.width - 0.5 &&
-            pixel.y() < to.height - 0.5))
-        continue;
-      float& value = result.at<float>(static_cast<int>(std::lround(pixel.y())),
-                                      static_cast<int>(std::lround(pixel.x())));
-      if (const auto seen = static_cast<float>(point.z()); value == 0.0F || seen < value) value = seen;
-    }
-  }
-  return result;
-}
-
 // The camera of the colour images at the size of the depth images.
 Camera colour_camera(const Path& folder, const GivenCamera& given, const cv::Size& colour,
                      const cv::Size& depth) {
@@ -153,12 +133,14 @@ FolderListing list_scannet(const Path& folder, const GivenCamera& camera) {
   for (auto& frame : listing.frames) {
     if (frame.T_world_camera) frame.T_world_camera = *frame.T_world_camera * T_rig_colour;
   }
-  const bool register_depth = !agree(depth_camera, listing.camera, T_colour_depth);
-  if (register_depth) ++listing.notes["depth was registered to colour by the calibration of both"];
-  listing.transform = [=, to = listing.camera](cv::Mat& image, cv::Mat& metres) {
+  std::shared_ptr<const DepthRegistration> registration;
+  if (!agree(depth_camera, listing.camera, T_colour_depth))
+    registration = std::make_shared<const DepthRegistration>(depth_camera, listing.camera, T_colour_depth);
+  if (registration) ++listing.notes["depth was registered to colour by the calibration of both"];
+  listing.transform = [=](cv::Mat& image, cv::Mat& metres) {
     // Averages over the area of a pixel where the image shrinks: its details would alias otherwise.
     if (image.size() != depth_size) cv::resize(image, image, depth_size, 0, 0, cv::INTER_AREA);
-    if (register_depth && !metres.empty()) metres = reprojected(metres, depth_camera, to, T_colour_depth);
+    if (registration && !metres.empty()) metres = (*registration)(metres);
   };
   return listing;
 }

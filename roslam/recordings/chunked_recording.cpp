@@ -157,6 +157,12 @@ void ChunkedRecording::finish_opening() {
   chunks_.erase(std::unique(chunks_.begin(), chunks_.end(), is_same), chunks_.end());
   std::stable_sort(chunks_.begin(), chunks_.end(),
                    [](const Chunk& a, const Chunk& b) { return a.first < b.first; });
+  // A library that is missing is found out now, not while reading.
+  if (!chunks_.empty() && chunks_.front().run == 0) {
+    is_noted_ = true;  // when it is read
+    if (const auto chunk = chunk_at(chunks_.front().offset)) require_compression(chunk->method, file_.name());
+    is_noted_ = false;
+  }
   is_opening_ = false;
 }
 

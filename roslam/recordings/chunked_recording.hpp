@@ -31,6 +31,9 @@ class ChunkedRecording : public Recording {
  protected:
   explicit ChunkedRecording(const std::filesystem::path& path) : file_(path), topics_(file_.name()) {}
 
+  /// Messages outside chunks are loaded in runs of so many bytes, or one by one if they are larger.
+  static constexpr std::uint64_t kRunBytes = std::uint64_t{4} << 20;
+
   /// A part of the file that is loaded at once.
   struct Chunk {
     std::uint64_t offset = 0;                // in the file, of its record
@@ -68,7 +71,7 @@ class ChunkedRecording : public Recording {
   /// Loads a chunk that no index describes, for its topics and times, and adds it. run: as in Chunk.
   void add_unindexed(std::uint64_t offset, std::size_t run);
   void add(Chunk chunk);
-  /// To be called once, when all chunks are added.
+  /// To be called once, when all chunks are added. Throws InputError if a library is missing that they need.
   void finish_opening();
   /// Forgets all chunks, to begin anew without the index.
   void clear_chunks() { chunks_.clear(); }

@@ -126,7 +126,8 @@ Produced unpack_zstd(ByteSpan packed, ByteBuffer& out, bool is_truncated) {
 }
 #endif
 
-Produced unpack(Compression method, ByteSpan packed, ByteBuffer& out, bool is_truncated) {
+Produced unpack(Compression method, [[maybe_unused]] ByteSpan packed, [[maybe_unused]] ByteBuffer& out,
+                [[maybe_unused]] bool is_truncated) {
   switch (method) {
 #ifdef ROSLAM_WITH_LZ4
     case Compression::kLz4:
@@ -179,7 +180,7 @@ std::optional<ByteBuffer> decompress(Compression method, ByteSpan packed, std::s
 
 bool is_zstd_frame(ByteSpan bytes) { return as_text(bytes).starts_with("\x28\xb5\x2f\xfd"); }
 
-std::optional<ByteBuffer> decompress_zstd_frame(ByteSpan packed, const std::string& file) {
+std::optional<ByteBuffer> decompress_zstd_frame([[maybe_unused]] ByteSpan packed, const std::string& file) {
   require_compression(Compression::kZstd, file);
 #ifdef ROSLAM_WITH_ZSTD
   // Unknown and damaged are the two largest values.
@@ -187,7 +188,6 @@ std::optional<ByteBuffer> decompress_zstd_frame(ByteSpan packed, const std::stri
   if (!is_plausible_size(Compression::kZstd, packed.size(), size)) return std::nullopt;
   return decompress(Compression::kZstd, packed, static_cast<std::size_t>(size), false, file);
 #else
-  (void)packed;
   return std::nullopt;
 #endif
 }

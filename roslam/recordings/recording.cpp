@@ -50,7 +50,7 @@ std::unique_ptr<Recording> open_recording(const std::filesystem::path& path) {
     case Container::kNone:
       break;
   }
-  if (!std::filesystem::exists(path))
+  if (std::error_code error; !std::filesystem::exists(path, error))
     throw InputError(path.string() +
                      ": no such file; give a .bag, .db3 or .mcap file or a folder of rosbag2");
   throw InputError(path.string() +

@@ -12,8 +12,6 @@ namespace {
 constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
 constexpr std::size_t kMaxHeader = 8192;  // of a record; holds the name of a topic at most
 constexpr std::uint64_t kMaxIndexBytes = std::uint64_t{256} << 20;
-constexpr std::uint64_t kRunBytes = std::uint64_t{4}
-                                    << 20;  // messages outside chunks that are loaded at once
 constexpr const char* kDamagedRecord = "damaged record; what follows it was left out";
 constexpr const char* kUndescribed = "message of a topic that the file does not describe, left out";
 
@@ -103,7 +101,6 @@ RosBag::RosBag(const std::filesystem::path& path) : ChunkedRecording(path) {
   const auto offset = index_offset();
   if (!offset || !read_index(*offset)) scan();
   finish_opening();
-  require_first_chunk();
 }
 
 // Where the index is, or nothing with a note if there is none.
@@ -225,16 +222,6 @@ void RosBag::scan() {
     at = end;
   }
   end_run();
-}
-
-// A library that is missing is found out when the file is opened.
-void RosBag::require_first_chunk() {
-  const auto head = head_at(file_, kMagic.size());
-  if (!head) return;
-  if (const auto chunk = head_at(file_, head->end()); chunk && chunk->operation == kChunk) {
-    const auto method = compression_named(field(chunk->header, "compression").value_or("none"));
-    if (method) require_compression(*method, file_.name());
-  }
 }
 
 std::optional<ChunkedRecording::PackedChunk> RosBag::chunk_at(std::uint64_t offset) {

@@ -30,7 +30,6 @@ class RosBag : public ChunkedRecording {
   bool add_indexed(std::string_view header, ByteSpan data);
   bool add_connection(std::string_view header, ByteSpan data);
   void scan();
-  void require_first_chunk();
 
   std::uint32_t expected_connections_ = 0;  // that the index should have
   std::uint32_t expected_chunks_ = 0;

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "roslam/recordings/rosbag2_folder.hpp"
 
+#include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <tuple>
 
 #include "roslam/common/error.hpp"
-#include "roslam/common/yaml_file.hpp"
 
 namespace roslam {
 
@@ -20,13 +21,14 @@ constexpr std::uintmax_t kMaxMetadataBytes = 16 << 20;
 
 bool is_part(const fs::path& file) { return file.extension() == ".db3" || file.extension() == ".mcap"; }
 
-bool has_metadata(const fs::path& folder) {
+// The text of metadata.yaml; empty if there is none of rosbag2.
+std::string metadata_of(const fs::path& folder) {
   std::error_code error;
   const std::uintmax_t size = fs::file_size(folder / kMetadata, error);
-  if (error || size > kMaxMetadataBytes) return false;
+  if (error || size > kMaxMetadataBytes) return {};
   std::ifstream in(folder / kMetadata, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
-  return text.find(kInformation) != std::string::npos;
+  return text.find(kInformation) == std::string::npos ? std::string() : text;
 }
 
 // The recordings in a folder: name_2.db3 comes before name_10.db3.
@@ -50,11 +52,11 @@ std::vector<fs::path> parts_by_number(const fs::path& folder) {
 }  // namespace
 
 bool Rosbag2Folder::recognises(const fs::path& folder) {
-  return has_metadata(folder) || !parts_by_number(folder).empty();
+  return !metadata_of(folder).empty() || !parts_by_number(folder).empty();
 }
 
 Rosbag2Folder::Rosbag2Folder(const fs::path& folder) : folder_(folder), topics_(folder.string()) {
-  std::vector<fs::path> files = has_metadata(folder) ? listed_files() : std::vector<fs::path>();
+  std::vector<fs::path> files = listed_files(metadata_of(folder));
   if (files.empty()) files = parts_by_number(folder);
   for (const fs::path& file : files) add(file);
   if (parts_.empty())
@@ -65,11 +67,12 @@ Rosbag2Folder::Rosbag2Folder(const fs::path& folder) : folder_(folder), topics_(
 
 // The files that metadata.yaml lists and that exist. Only their names count, as some versions of rosbag2
 // write paths relative to the folder above.
-std::vector<fs::path> Rosbag2Folder::listed_files() {
+std::vector<fs::path> Rosbag2Folder::listed_files(const std::string& metadata) {
   std::vector<fs::path> files;
+  if (metadata.empty()) return files;
   try {
-    const YAML::Node metadata = load_yaml(folder_ / kMetadata, "cannot be read");
-    for (const auto& listed : metadata[kInformation]["relative_file_paths"]) {
+    const YAML::Node read = YAML::Load(metadata);
+    for (const auto& listed : read[kInformation]["relative_file_paths"]) {
       fs::path file = folder_ / fs::path(listed.as<std::string>()).filename();
       if (file.extension() == ".zstd" && !fs::exists(file)) file.replace_extension();  // unpacked since
       if (fs::is_regular_file(file)) {

@@ -40,7 +40,7 @@ class Rosbag2Folder : public Recording {
     std::map<std::string, std::size_t> notes;  // with those of reading it, once it was read
   };
 
-  std::vector<std::filesystem::path> listed_files();
+  std::vector<std::filesystem::path> listed_files(const std::string& metadata);
   void add(const std::filesystem::path& file);
   void open_part();
 

@@ -13,6 +13,7 @@
 namespace roslam {
 
 namespace {
+constexpr std::size_t kMaxDefinitionBytes = std::size_t{64} << 20;
 constexpr std::uintmax_t kMaxCountedBytes = std::uintmax_t{1} << 30;  // counting reads a part of the file
 
 // A URI, as only it can say that nothing may be written.
@@ -48,7 +49,7 @@ std::string text_of(sqlite3_stmt* row, int column) {
 class SqliteRecording : public Recording {
  public:
   explicit SqliteRecording(const std::filesystem::path& path)
-      : name_(path.string()), unpacked_size_(std::filesystem::file_size(path)), topics_(name_) {
+      : name_(path.string()), file_size_(std::filesystem::file_size(path)), topics_(name_) {
     require_whole(path);
     open();
     require_tables();
@@ -148,28 +149,36 @@ class SqliteRecording : public Recording {
     }
   }
 
-  // Definitions are in a table of their own, since ROS 2 Iron.
-  void read_topics() {
-    std::map<std::string, std::string> definitions;
+  // By type. They are in a table of their own, since ROS 2 Iron.
+  std::map<std::string, std::string> definitions() const {
+    std::map<std::string, std::string> found;
     sqlite3_stmt* statement = nullptr;
-    if (sqlite3_prepare_v2(database_.get(),
-                           "SELECT topic_type, encoded_message_definition FROM message_definitions", -1,
-                           &statement, nullptr) == SQLITE_OK) {
-      const Statement rows(statement);
-      while (sqlite3_step(rows.get()) == SQLITE_ROW)
-        definitions.try_emplace(text_of(rows.get(), 0), text_of(rows.get(), 1));
+    constexpr const char* kQuery = "SELECT topic_type, encoded_message_definition FROM message_definitions";
+    if (sqlite3_prepare_v2(database_.get(), kQuery, -1, &statement, nullptr) != SQLITE_OK) return found;
+    const Statement rows(statement);
+    std::size_t bytes = 0;
+    while (bytes < kMaxDefinitionBytes && sqlite3_step(rows.get()) == SQLITE_ROW) {
+      const std::string type = text_of(rows.get(), 0);
+      const std::string definition = text_of(rows.get(), 1);
+      bytes += type.size() + definition.size();
+      found.try_emplace(type, definition);
     }
+    return found;
+  }
+
+  void read_topics() {
+    const std::map<std::string, std::string> described = definitions();
     const Statement rows = prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id");
     while (sqlite3_step(rows.get()) == SQLITE_ROW) {
       RecordedTopic topic;
       topic.name = text_of(rows.get(), 1);
       topic.type = text_of(rows.get(), 2);
       topic.encoding = text_of(rows.get(), 3);
-      if (const auto found = definitions.find(topic.type); found != definitions.end())
+      if (const auto found = described.find(topic.type); found != described.end())
         topic.definition = found->second;
       topics_.assign(static_cast<std::uint32_t>(sqlite3_column_int64(rows.get(), 0)), topics_.add(topic));
     }
-    if (unpacked_size_ > kMaxCountedBytes) return;
+    if (file_size_ > kMaxCountedBytes) return;
     for (const RecordedTopic& topic : topics_.all()) topics_.count(topic.id, 0);
     const Statement counts = prepare("SELECT topic_id, count(*) FROM messages GROUP BY topic_id");
     while (sqlite3_step(counts.get()) == SQLITE_ROW) {
@@ -227,7 +236,7 @@ class SqliteRecording : public Recording {
   }
 
   std::string name_;
-  std::uintmax_t unpacked_size_;
+  std::uintmax_t file_size_;
   TopicTable topics_;
   std::unique_ptr<sqlite3, CloseDatabase> database_;
   Statement order_;    // messages in the order of time, without their data

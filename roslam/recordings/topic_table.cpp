@@ -9,6 +9,7 @@ namespace roslam {
 
 namespace {
 constexpr std::size_t kMaxTopics = 65536;
+constexpr std::size_t kMaxNameBytes = std::size_t{64} << 20;
 constexpr std::size_t kMaxDefinitionBytes = std::size_t{64} << 20;
 }  // namespace
 
@@ -19,10 +20,11 @@ int TopicTable::add(RecordedTopic topic) {
     if (topic.messages) count(entry->second, *topic.messages);
     return entry->second;
   }
-  if (topics_.size() >= kMaxTopics)
+  name_bytes_ += topic.name.size() + topic.type.size() + topic.encoding.size();
+  if (topics_.size() >= kMaxTopics || name_bytes_ > kMaxNameBytes)
     throw InputError(name_ + ": damaged, it describes more than 65536 topics; record it again");
-  definition_bytes_ += topic.name.size() + topic.type.size() + topic.definition.size();
-  if (definition_bytes_ > kMaxDefinitionBytes) topic.definition.clear();
+  if (topic.definition.size() > kMaxDefinitionBytes - definition_bytes_) topic.definition.clear();
+  definition_bytes_ += topic.definition.size();
   topic.id = entry->second;
   topics_.push_back(std::move(topic));
   return entry->second;

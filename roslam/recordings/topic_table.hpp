@@ -21,7 +21,7 @@ class TopicTable {
   explicit TopicTable(std::string name) : name_(std::move(name)) {}
 
   /// The topic's id; a new one if there is none like it. Its message count is added. Definitions beyond 64 MB
-  /// in all are left empty. Throws InputError if there are more than 65536 topics.
+  /// in all are left empty. Throws InputError if there are more than 65536 topics, or 64 MB of names.
   int add(RecordedTopic topic);
 
   /// Says which topic a channel of the file is of. Throws InputError if there are more than 65536 channels.
@@ -39,6 +39,7 @@ class TopicTable {
   std::vector<RecordedTopic> topics_;
   std::map<std::tuple<std::string, std::string, std::string>, int> ids_;  // by name, type and encoding
   std::unordered_map<std::uint32_t, int> of_channel_;
+  std::size_t name_bytes_ = 0;
   std::size_t definition_bytes_ = 0;
 };
 

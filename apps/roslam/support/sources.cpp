@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "roslam/common/error.hpp"
+#include "roslam/datasets/dataset.hpp"
 #include "roslam/ros/recording_source.hpp"
 #include "simulation/degraded_source.hpp"
 #include "simulation/simulated_source.hpp"
@@ -45,10 +46,11 @@ void for_each_flight_option(Arguments& arguments, const Visitor& visit) {
 }  // namespace
 
 CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
-  CLI::Option* source = command.add_option("SOURCE", arguments.name,
-                                           "Folder in TUM RGB-D format, recording (ROS 1 bag, rosbag2 "
-                                           "file or folder, MCAP), or simulated:street, simulated:loop, "
-                                           "simulated:hover, simulated:turn, simulated:corridor");
+  CLI::Option* source = command.add_option(
+      "SOURCE", arguments.name,
+      "Folder of a dataset (TUM RGB-D, 7-Scenes, ScanNet, ICL-NUIM, "
+      "OpenLORIS), recording (ROS 1 bag, rosbag2 file or folder, MCAP), or simulated:street, simulated:loop, "
+      "simulated:hover, simulated:turn, simulated:corridor");
   command.add_option("--camera", arguments.camera,
                      "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) "
                      "or a YAML file; not "
@@ -210,11 +212,33 @@ std::unique_ptr<FrameSource> open_recorded(const SourceArguments& arguments) {
   if (!arguments.mount.empty()) mount = mount_from(arguments.mount);
   return std::make_unique<RecordingSource>(arguments.name, arguments.topics, camera, mount);
 }
+
+// A folder in another format than TUM RGB-D with its lists.
+bool is_other_dataset(const std::string& name) {
+  const auto format = dataset_format(name);
+  return format && !(*format == DatasetFormat::kTum && TumSource::recognises(name));
+}
+
+std::unique_ptr<FrameSource> open_other_dataset(const SourceArguments& arguments) {
+  refuse_frames(arguments);
+  std::optional<Camera> camera;
+  if (!arguments.camera.empty()) camera = load_camera(arguments.camera);
+  if (!arguments.mount.empty()) {
+    // The mount is of the camera that the folder knows, if none is given.
+    if (!camera) camera = open_dataset(arguments.name, std::nullopt)->camera();
+    camera->T_body_camera = mount_from(arguments.mount);
+  }
+  return open_dataset(arguments.name, camera);
+}
 }  // namespace
 
 std::unique_ptr<TumSource> open_folder(const SourceArguments& arguments) {
   if (is_recording(arguments.name))
     throw InputError(arguments.name + ": is a recording, and this needs a folder in the TUM RGB-D format");
+  if (is_other_dataset(arguments.name))
+    throw InputError(arguments.name + ": is in the format of " +
+                     std::string(name_of(*dataset_format(arguments.name))) +
+                     ", and this needs a folder in the TUM RGB-D format");
   if (arguments.camera.empty()) {
     throw InputError(arguments.name +
                      ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a file");
@@ -229,6 +253,8 @@ std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
     source = std::make_unique<SimulatedSource>(*flight);
   } else if (is_recording(arguments.name)) {
     source = open_recorded(arguments);
+  } else if (is_other_dataset(arguments.name)) {
+    source = open_other_dataset(arguments);
   } else {
     source = open_folder(arguments);
   }
