@@ -152,8 +152,9 @@ SourceArguments flight_from_words(const std::string& name, const std::map<std::s
 
 std::unique_ptr<TumSource> open_recording(const SourceArguments& arguments) {
   if (arguments.camera.empty()) {
-    throw InputError(arguments.name +
-                     ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a file");
+    throw InputError(
+        arguments.name +
+        ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes bonn d435 d455) or a file");
   }
   if (arguments.frames != 0) {
     throw InputError("--frames " + std::to_string(arguments.frames) +
