@@ -7,6 +7,8 @@ set(ROSLAM_PUBLIC_HEADERS
   common/stage_times.hpp
   geometry/alignment.hpp
   geometry/camera.hpp
+  geometry/camera_export.hpp
+  geometry/camera_import.hpp
   geometry/depth_noise.hpp
   geometry/imu_calibration.hpp
   geometry/mount.hpp

@@ -7,6 +7,7 @@
 #include "roslam/common/write_file.hpp"
 #include "roslam/dense/surface_file.hpp"
 #include "roslam/geometry/camera.hpp"
+#include "roslam/geometry/camera_export.hpp"
 #include "roslam/map_io/map_file.hpp"
 #include "roslam/occupancy/occupancy_map.hpp"
 #include "roslam/options/options.hpp"
@@ -124,6 +125,27 @@ void write_recordings(const std::filesystem::path& folder) {
     writer.close();
   }
 }
+
+// Camera files of other programs.
+void put_cameras(const std::filesystem::path& folder) {
+  Camera camera = *camera_preset("tum-fr3");
+  camera.imu = ImuCalibration{};
+  write_file(folder / "kalibr", camera_to_kalibr(camera));
+  write_file(folder / "ros", camera_to_ros(camera));
+  write_file(folder / "opencv", camera_to_opencv(camera));
+  write_file(
+      folder / "xml",
+      "<?xml version=\"1.0\"?>\n<opencv_storage><image_width>640</image_width>"
+      "<image_height>480</image_height><camera_matrix type_id=\"opencv-matrix\"><data>\n500 0 320 0 500 240 "
+      "0 0 1</data></camera_matrix><d><_>0.1</_><_>0</_></d></opencv_storage>\n");
+  write_file(folder / "asl",
+             "sensor_type: camera\nT_BS: {data: [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}\nrate_hz: 20\n"
+             "resolution: [640, 480]\ncamera_model: pinhole\nintrinsics: [500, 500, 320, 240]\n"
+             "distortion_model: equidistant\ndistortion_coefficients: [0.1, 0, 0, 0]\n");
+  write_file(folder / "orb_slam",
+             "%YAML:1.0\nCamera.fx: 500\nCamera.fy: 500\nCamera.cx: 320\nCamera.cy: 240\nCamera.k1: 0.1\n"
+             "Camera.width: 640\nCamera.height: 480\nDepthMapFactor: 5000\n");
+}
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -138,6 +160,7 @@ int main(int count, char** arguments) {
   };
   try {
     put("camera", camera_to_yaml(*camera_preset("tum-fr1")));
+    put_cameras(folder / "camera");
     put("options", options_to_yaml({}));
     put("trajectory", "# time x y z\n1.5 0 0 1 0 0 0 1\n2.5 0 1 1 0 0 0.6 0.8\n");
     put("tum_list", "# time file\n1.5 rgb/1.5.png\n2.5 rgb/2.5.png\n");

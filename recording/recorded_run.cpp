@@ -25,7 +25,7 @@ Camera camera_from(const Json& json) {
   json.at("fy").get_to(camera.fy);
   json.at("cx").get_to(camera.cx);
   json.at("cy").get_to(camera.cy);
-  json.at("distortion").get_to(camera.distortion);
+  camera.set_lens(json.value("model", "pinhole"), json.at("distortion").get<std::vector<double>>());
   json.at("depth_units_per_metre").get_to(camera.depth_units_per_metre);
   json.at("fps").get_to(camera.fps);
   if (json.contains("T_body_camera")) {

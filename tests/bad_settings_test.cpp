@@ -66,7 +66,9 @@ TEST_F(BadSettings, CameraFileAndKeyAreNamed) {
   }
   expect_refused(run("", file("width: 640\nheight: 480\nfx: 525\nfy: 525\ncx: 320\ncy: 240\n")),
                  {"settings.yaml", "no 'depth_units_per_metre'", "1000", "5000"});
-  expect_refused(run("", file(camera_with("model", "fisheye"))), {"settings.yaml", "fisheye", "use pinhole"});
+  expect_refused(run("", file(camera_with("model", "omni"))),
+                 {"settings.yaml", "omni", "use pinhole or fisheye"});
+  expect_refused(run("", file(camera_with("model", "fisheye"))), {"settings.yaml", "k1 k2 k3 k4"});
   expect_refused(run("", file(camera_with("fx", "385\nfx: 400"))), {"settings.yaml", "'fx' is given twice"});
   expect_refused(run("", file("width: 640\n")), {"settings.yaml", "no 'height'; add it"});
   EXPECT_FALSE(fs::exists(run_));

@@ -147,10 +147,10 @@ TEST_F(CameraFile, HasNoDefaultForTheScaleOfDepth) {
 TEST_F(CameraFile, RefusesDistortionThatCouldMeanTwoThings) {
   EXPECT_THROW(read(good_ + "distortion: [0.1, -0.2, 0.01]\n"), InputError);
   EXPECT_EQ(read(good_ + "distortion: [0.1, -0.2]\n").distortion,
-            (std::array<double, 5>{0.1, -0.2, 0, 0, 0}));
+            (std::array<double, 8>{0.1, -0.2, 0, 0, 0}));
   EXPECT_EQ(read(good_ + "distortion: [0.1, -0.2, 0.001, 0.002]\n").distortion,
-            (std::array<double, 5>{0.1, -0.2, 0.001, 0.002, 0}));
-  EXPECT_EQ(read(good_ + "distortion: []\n").distortion, (std::array<double, 5>{}));
+            (std::array<double, 8>{0.1, -0.2, 0.001, 0.002, 0}));
+  EXPECT_EQ(read(good_ + "distortion: []\n").distortion, (std::array<double, 8>{}));
 }
 
 TEST_F(CameraFile, TellsACalibrationOfAnotherSize) {

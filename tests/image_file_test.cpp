@@ -67,6 +67,34 @@ TEST_F(ImageFiles, PixelsAreTakenAsStoredWhateverTheOrientation) {
   }
 }
 
+TEST_F(ImageFiles, GreyImagesBecomeThreeEqualChannels) {
+  cv::Mat grey(48, 64, CV_8UC1);
+  for (int x = 0; x < 64; ++x) grey.col(x) = 4 * x;
+  const ImageFile png = read_colour_image(put("grey.png", encoded(".png", grey)));
+  ASSERT_EQ(png.error, "");
+  ASSERT_EQ(png.image.type(), CV_8UC3);
+  EXPECT_EQ(png.image.at<cv::Vec3b>(7, 50), cv::Vec3b(200, 200, 200));
+  const ImageFile jpeg = read_colour_image(put("grey.jpg", encoded(".jpg", grey)));
+  ASSERT_EQ(jpeg.image.type(), CV_8UC3);
+  EXPECT_NEAR(jpeg.image.at<cv::Vec3b>(7, 50)[1], 200, 3);
+  // 16 bits, in use all or twelve: the most significant eight remain.
+  for (const int bits : {12, 16}) {
+    cv::Mat deep;
+    grey.convertTo(deep, CV_16UC1, 1 << (bits - 8));
+    deep.at<std::uint16_t>(0, 0) = static_cast<std::uint16_t>((1 << bits) - 1);
+    const ImageFile read = read_colour_image(put("grey16.png", encoded(".png", deep)));
+    ASSERT_EQ(read.error, "");
+    ASSERT_EQ(read.image.type(), CV_8UC3) << bits;
+    EXPECT_EQ(read.bits, bits);
+    EXPECT_EQ(read.image.at<cv::Vec3b>(0, 0), cv::Vec3b(255, 255, 255));
+    for (int x = 1; x < 64; ++x) {
+      const cv::Vec3b pixel = read.image.at<cv::Vec3b>(7, x);
+      EXPECT_NEAR(pixel[0], 4 * x, 1) << bits;
+      EXPECT_TRUE(pixel[0] == pixel[1] && pixel[1] == pixel[2]);
+    }
+  }
+}
+
 TEST_F(ImageFiles, PaddingAfterTheEndDoesNotMatter) {
   for (const std::string ending : {".jpg", ".png"}) {
     const std::string bytes = encoded(ending, image_);

@@ -169,9 +169,38 @@ TEST_F(Atlas, SaysWhatIsWrongWithAFile) {
   expect_error("not a map");
   save_map(file_, fly(0.0, 0.25));
   std::string bytes = read(file_);
-  bytes[8] = 3;
+  bytes[8] = 4;
   write_file(file_, bytes);
-  expect_error("version 3");
+  expect_error("version 4");
+}
+
+TEST_F(Atlas, KeepsTheLensModel) {
+  SavedMap saved = fly(0.0, 0.25);
+  const auto version = [&] { return static_cast<int>(read(file_)[8]); };
+  save_map(file_, saved);
+  const int before = version();
+  EXPECT_LT(before, 3);
+  for (const auto& [model, coefficients] : std::vector<std::pair<const char*, std::vector<double>>>{
+           {"pinhole", {0.1, -0.05, 0.001, 0.002, 0.01, 0.02, -0.03, 0.04}},
+           {"fisheye", {0.01, -0.002, 0.0003, -0.0004}}}) {
+    saved.camera.set_lens(model, coefficients);
+    save_map(file_, saved);
+    EXPECT_EQ(version(), 3) << model;
+    const SavedMap loaded = load_map(file_);
+    EXPECT_EQ(loaded.camera.model, saved.camera.model);
+    EXPECT_EQ(loaded.camera.distortion, saved.camera.distortion);
+    EXPECT_EQ(encode_map(loaded), encode_map(saved));
+    loaded.require_fits(saved.camera, kScales);
+    Camera other = saved.camera;
+    other.distortion[3] += 1e-4;
+    EXPECT_NE(error_of([&] { loaded.require_fits(other, kScales); }), "") << model;
+  }
+  Camera pinhole = saved.camera;
+  pinhole.model = LensModel::kPinhole;
+  EXPECT_NE(error_of([&] { load_map(file_).require_fits(pinhole, kScales); }), "");
+  saved.camera.set_lens("pinhole", {0.1, -0.05, 0.001, 0.002, 0.01});
+  save_map(file_, saved);
+  EXPECT_EQ(version(), before) << "earlier programs read what they know";
 }
 
 TEST_F(Atlas, AMapOfAnotherCameraIsRefused) {

@@ -65,17 +65,18 @@ SE3 CalibrationYaml::transform(const YAML::Node& node, const std::string& key) c
   return *rigid;
 }
 
-std::array<double, 5> CalibrationYaml::distortion(const YAML::Node& node, const std::string& model_key,
-                                                  const std::string& key) const {
+void CalibrationYaml::set_lens(const YAML::Node& node, const std::string& model_key, const std::string& key,
+                               Camera& camera) const {
   const std::string model = text(node, model_key);
-  if (model.empty() || model == "none") return {};
-  if (model != "radial-tangential" && model != "radtan")
+  if (model.empty() || model == "none") return;
+  const bool is_pinhole = model == "radial-tangential" || model == "radtan";
+  if (!is_pinhole && model != "equidistant")
     fail("the distortion model '" + model + "' is not supported; give images without distortion");
-  const auto values = list(node, key);
-  if (values.size() != 4 && values.size() != 5) fail("'" + key + "' must have 4 or 5 numbers");
-  std::array<double, 5> coefficients{};
-  std::copy(values.begin(), values.end(), coefficients.begin());
-  return coefficients;
+  try {
+    camera.set_lens(is_pinhole ? "pinhole" : "fisheye", list(node, key));
+  } catch (const InputError& error) {
+    fail("'" + key + "': " + error.what());
+  }
 }
 
 }  // namespace roslam::datasets

@@ -31,9 +31,10 @@ class CalibrationYaml {
   /// As numbers(), of a 4x4 matrix that must be a rigid transform.
   SE3 transform(const YAML::Node& node, const std::string& key) const;
 
-  /// As numbers(), of 4 or 5 coefficients of the model "radial-tangential" (k1 k2 p1 p2 k3); none if absent.
-  std::array<double, 5> distortion(const YAML::Node& node, const std::string& model_key,
-                                   const std::string& key) const;
+  /// The lens of a camera: the coefficients of the model "radial-tangential" or "equidistant"; none if it is
+  /// absent.
+  void set_lens(const YAML::Node& node, const std::string& model_key, const std::string& key,
+                Camera& camera) const;
 
  private:
   [[noreturn]] void fail(const std::string& what) const;

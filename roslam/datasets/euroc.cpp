@@ -42,7 +42,7 @@ AslCamera read_sensor(const Path& folder) {
   sensor.camera.fy = intrinsics[1];
   sensor.camera.cx = intrinsics[2];
   sensor.camera.cy = intrinsics[3];
-  sensor.camera.distortion = file.distortion(root, "distortion_model", "distortion_coefficients");
+  file.set_lens(root, "distortion_model", "distortion_coefficients", sensor.camera);
   if (root["rate_hz"]) sensor.camera.fps = file.number(root, "rate_hz");
   sensor.T_body_sensor = file.transform(root, "T_BS");
   return sensor;

@@ -34,7 +34,7 @@ Camera camera_of(const Path& folder) {
   camera.cx = intrinsics[1];
   camera.fy = intrinsics[2];
   camera.cy = intrinsics[3];
-  camera.distortion = file.distortion(node, "distortion_model", "distortion_coefficients");
+  file.set_lens(node, "distortion_model", "distortion_coefficients", camera);
   if (node["fps"]) camera.fps = file.number(node, "fps");
   camera.depth_units_per_metre = 1000.0;
   camera.depth_noise = camera_preset("d435")->depth_noise;

@@ -32,6 +32,7 @@ Camera reduced_camera(const Camera& camera, int stride) {
   reduced.width = (camera.width + stride - 1) / stride;
   reduced.height = (camera.height + stride - 1) / stride;
   for (double* value : {&reduced.fx, &reduced.fy, &reduced.cx, &reduced.cy}) *value /= stride;
+  reduced.model = LensModel::kPinhole;
   reduced.distortion = {};
   return reduced;
 }

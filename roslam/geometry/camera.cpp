@@ -7,6 +7,7 @@
 #include <string>
 
 #include "roslam/common/error.hpp"
+#include "roslam/geometry/lens.hpp"
 
 namespace roslam {
 
@@ -15,24 +16,64 @@ void require(bool condition, const std::string& message) {
   if (!condition) throw CalibrationError("camera calibration: " + message);
 }
 
-// True if distortion can be inverted in all but a few pixels, such as those of an extreme corner.
+// True if distortion can be inverted in all but a few pixels, such as those of an extreme corner. The image
+// of a fisheye may be a circle that fills a third of it.
 bool is_invertible(const Camera& camera) {
   constexpr int kSteps = 16;  // along each side of a grid over the image
-  constexpr int kFewPoints = (kSteps + 1) * (kSteps + 1) / 10;
-  constexpr double kTolerance = 0.5;  // pixels
+  constexpr int kPoints = (kSteps + 1) * (kSteps + 1);
+  const int few = camera.model == LensModel::kFisheye ? kPoints * 2 / 3 : kPoints / 10;
   int failures = 0;
   for (int i = 0; i <= kSteps; ++i) {
     for (int j = 0; j <= kSteps; ++j) {
       const Eigen::Vector2d pixel((camera.width - 1.0) * i / kSteps, (camera.height - 1.0) * j / kSteps);
-      const Eigen::Vector2d back = camera.distort(camera.undistort(pixel));
-      if (!((back - pixel).norm() < kTolerance)) ++failures;
+      if (!camera.try_undistort(pixel)) ++failures;
     }
   }
-  return failures <= kFewPoints;
+  return failures <= few;
+}
+
+// Of undistorted pixels, as tables and grids cover them.
+bool has_bounded_image(const Camera& camera) {
+  constexpr double kLargest = 16.0;
+  const auto [left, top, right, bottom] = camera.undistorted_bounds();
+  return right - left <= kLargest * camera.width && bottom - top <= kLargest * camera.height;
+}
+
+// Newton's method with a numeric Jacobian, as earlier versions have it for the five coefficients: recorded
+// results depend on its last bits. Nothing where it does not converge.
+std::optional<Eigen::Vector2d> invert_five_coefficients(const Camera& camera, const Eigen::Vector2d& pixel) {
+  constexpr double kStep = 1e-3;
+  const Lens lens(camera);
+  const auto normalised = [&](const Eigen::Vector2d& at) {
+    return Eigen::Vector2d((at.x() - camera.cx) / camera.fx, (at.y() - camera.cy) / camera.fy);
+  };
+  const auto distort = [&](const Eigen::Vector2d& at) {
+    const Eigen::Vector2d distorted = lens.distort(normalised(at));
+    return Eigen::Vector2d(camera.fx * distorted.x() + camera.cx, camera.fy * distorted.y() + camera.cy);
+  };
+  Eigen::Vector2d estimate = pixel;
+  for (int i = 0; i < 10; ++i) {
+    const Eigen::Vector2d residual = distort(estimate) - pixel;
+    if (residual.squaredNorm() < 1e-14)
+      return lens.is_valid(normalised(estimate)) ? std::make_optional(estimate) : std::nullopt;
+    Eigen::Matrix2d jacobian;
+    jacobian.col(0) =
+        (distort(estimate + Eigen::Vector2d(kStep, 0)) - distort(estimate - Eigen::Vector2d(kStep, 0)));
+    jacobian.col(1) =
+        (distort(estimate + Eigen::Vector2d(0, kStep)) - distort(estimate - Eigen::Vector2d(0, kStep)));
+    jacobian /= 2.0 * kStep;
+    if (std::abs(jacobian.determinant()) < 1e-9) break;
+    estimate -= jacobian.inverse() * residual;
+  }
+  return std::nullopt;
 }
 
 bool positive(double value) { return std::isfinite(value) && value > 0.0; }
 }  // namespace
+
+std::string_view lens_model_name(LensModel model) {
+  return model == LensModel::kFisheye ? "fisheye" : "pinhole";
+}
 
 std::string_view usual_depth_units() {
   return "it is 1000 for depth in millimetres (RealSense, Azure Kinect, 7-Scenes) and 5000 for TUM RGB-D";
@@ -45,6 +86,10 @@ void Camera::validate() const {
   require(height >= 32 && height <= 16384,
           "height must be 32 to 16384 pixels, got " + std::to_string(height) + got);
   require(positive(fx), "fx must be positive, got " + std::to_string(fx) + got);
+  require(!(fy < 0.0),
+          "fy is negative, got " + std::to_string(fy) +
+              ": in the convention of that calibration the rows of the images are upside down; give fy "
+              "without its sign, cy as counted from the top row, and check the images");
   require(positive(fy), "fy must be positive, got " + std::to_string(fy) + got);
   require(fx / fy > 0.1 && fx / fy < 10.0, "fx and fy differ more than tenfold" + got);
   require(fx > 0.05 * width && fx < 100.0 * width, "fx is implausible for the image width" + got);
@@ -53,9 +98,15 @@ void Camera::validate() const {
   require(cy > 0.0 && cy < height, "cy must lie within the image, got " + std::to_string(cy) + got);
   for (const double k : distortion) {
     require(std::isfinite(k) && std::abs(k) < 1000.0,
-            "distortion must be five finite numbers k1 k2 p1 p2 k3" + got);
+            "distortion must be finite numbers, " +
+                std::string(model == LensModel::kFisheye ? "k1 k2 k3 k4" : "k1 k2 p1 p2 k3 [k4 k5 k6]") +
+                got);
   }
+  require(model == LensModel::kPinhole ||
+              std::all_of(distortion.begin() + 4, distortion.end(), [](double k) { return k == 0.0; }),
+          "distortion of a fisheye has four numbers k1 k2 k3 k4" + got);
   require(is_invertible(*this), "distortion cannot be inverted over the image" + got);
+  require(has_bounded_image(*this), "distortion spreads the image over more than 16 times its size" + got);
   require(depth_units_per_metre == 0.0 || positive(depth_units_per_metre),
           "depth_units_per_metre must be positive, got " + std::to_string(depth_units_per_metre) + "; " +
               std::string(usual_depth_units()));
@@ -72,7 +123,36 @@ void Camera::validate() const {
 }
 
 bool Camera::has_distortion() const {
-  return std::any_of(distortion.begin(), distortion.end(), [](double k) { return k != 0.0; });
+  return model == LensModel::kFisheye ||
+         std::any_of(distortion.begin(), distortion.end(), [](double k) { return k != 0.0; });
+}
+
+void Camera::set_lens(std::string_view model_name, const std::vector<double>& coefficients) {
+  const bool is_fisheye = model_name == lens_model_name(LensModel::kFisheye);
+  if (!is_fisheye && model_name != lens_model_name(LensModel::kPinhole))
+    throw InputError("camera model '" + std::string(model_name) +
+                     "' is not supported; use pinhole or fisheye");
+  const std::size_t n = coefficients.size();
+  // Three could be k1 k2 p1 as well as k1 k2 k3.
+  const bool is_known = is_fisheye ? n == 4 : n == 0 || n == 2 || n == 4 || n == 5 || n == 8;
+  if (!is_known) {
+    throw InputError("distortion has " + std::to_string(n) + " values; give " +
+                     (is_fisheye ? "k1 k2 k3 k4 of a fisheye" : "k1 k2 p1 p2 k3, or these and k4 k5 k6") +
+                     ", with 0 for those that are not known");
+  }
+  model = is_fisheye ? LensModel::kFisheye : LensModel::kPinhole;
+  distortion = {};
+  std::copy(coefficients.begin(), coefficients.end(), distortion.begin());
+}
+
+bool Camera::is_rational() const {
+  return model == LensModel::kPinhole &&
+         std::any_of(distortion.begin() + 5, distortion.end(), [](double k) { return k != 0.0; });
+}
+
+std::vector<double> Camera::coefficients() const {
+  const std::ptrdiff_t count = model == LensModel::kFisheye ? 4 : is_rational() ? 8 : 5;
+  return {distortion.begin(), distortion.begin() + count};
 }
 
 bool Camera::has_central_principal_point() const {
@@ -81,34 +161,36 @@ bool Camera::has_central_principal_point() const {
 }
 
 Eigen::Vector2d Camera::distort(const Eigen::Vector2d& pixel) const {
-  const auto& [k1, k2, p1, p2, k3] = distortion;
-  const double x = (pixel.x() - cx) / fx;
-  const double y = (pixel.y() - cy) / fy;
-  const double r2 = x * x + y * y;
-  const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-  const double xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
-  const double yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
-  return {fx * xd + cx, fy * yd + cy};
+  const Lens lens(*this);
+  const Eigen::Vector2d point((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
+  if (!lens.is_valid(point)) {
+    const Eigen::Vector2d direction(fx * point.x(), fy * point.y());
+    return Eigen::Vector2d(cx, cy) + 2.0 * (width + height) * direction.stableNormalized();
+  }
+  const Eigen::Vector2d distorted = lens.distort(point);
+  return {fx * distorted.x() + cx, fy * distorted.y() + cy};
+}
+
+Eigen::Matrix2d Camera::distort_jacobian(const Eigen::Vector2d& pixel) const {
+  const Eigen::Vector2d point((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
+  const Eigen::Vector2d focal(fx, fy);
+  return focal.asDiagonal() * Lens(*this).jacobian(point) * focal.cwiseInverse().asDiagonal();
 }
 
 Eigen::Vector2d Camera::undistort(const Eigen::Vector2d& pixel) const {
+  if (const auto undistorted = try_undistort(pixel)) return *undistorted;
+  const Eigen::Vector2d outermost = Lens(*this).outermost({(pixel.x() - cx) / fx, (pixel.y() - cy) / fy});
+  return {fx * outermost.x() + cx, fy * outermost.y() + cy};
+}
+
+std::optional<Eigen::Vector2d> Camera::try_undistort(const Eigen::Vector2d& pixel) const {
   if (!has_distortion()) return pixel;
-  // Newton's method on distort() with a numeric Jacobian; three to four steps reach 1e-6 pixels.
-  constexpr double kStep = 1e-3;
-  Eigen::Vector2d estimate = pixel;
-  for (int i = 0; i < 10; ++i) {
-    const Eigen::Vector2d residual = distort(estimate) - pixel;
-    if (residual.squaredNorm() < 1e-14) break;
-    Eigen::Matrix2d jacobian;
-    jacobian.col(0) =
-        (distort(estimate + Eigen::Vector2d(kStep, 0)) - distort(estimate - Eigen::Vector2d(kStep, 0)));
-    jacobian.col(1) =
-        (distort(estimate + Eigen::Vector2d(0, kStep)) - distort(estimate - Eigen::Vector2d(0, kStep)));
-    jacobian /= 2.0 * kStep;
-    if (std::abs(jacobian.determinant()) < 1e-9) break;
-    estimate -= jacobian.inverse() * residual;
+  if (model == LensModel::kPinhole && !is_rational()) {
+    if (const auto found = invert_five_coefficients(*this, pixel)) return found;
   }
-  return estimate.allFinite() ? estimate : pixel;
+  const auto point = Lens(*this).undistort({(pixel.x() - cx) / fx, (pixel.y() - cy) / fy});
+  if (!point) return std::nullopt;
+  return Eigen::Vector2d(fx * point->x() + cx, fy * point->y() + cy);
 }
 
 std::array<double, 4> Camera::undistorted_bounds() const {

@@ -6,8 +6,7 @@
 namespace roslam {
 
 namespace {
-constexpr double kDistortionTolerance = 0.5;  // pixels, error allowed when removing distortion
-constexpr float kNearest = 0.05F;             // metres
+constexpr float kNearest = 0.05F;  // metres
 }  // namespace
 
 PixelRays::PixelRays(const Camera& camera)
@@ -18,14 +17,11 @@ PixelRays::PixelRays(const Camera& camera)
   high_ = -low_;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
-      const Eigen::Vector2d pixel(x, y);
-      const Eigen::Vector2d undistorted = camera.undistort(pixel);
-      const Eigen::Vector3d ray = camera.unproject(undistorted, 1.0);
-      const bool is_known = (camera.distort(undistorted) - pixel).norm() < kDistortionTolerance;
-      rays_.at<cv::Vec2f>(y, x) = is_known
-                                      ? cv::Vec2f(static_cast<float>(ray.x()), static_cast<float>(ray.y()))
-                                      : cv::Vec2f::all(std::numeric_limits<float>::quiet_NaN());
-      if (!is_known) continue;
+      auto& stored = rays_.at<cv::Vec2f>(y, x) = cv::Vec2f::all(std::numeric_limits<float>::quiet_NaN());
+      const auto undistorted = camera.try_undistort(Eigen::Vector2d(x, y));
+      if (!undistorted) continue;
+      const Eigen::Vector3d ray = camera.unproject(*undistorted, 1.0);
+      stored = {static_cast<float>(ray.x()), static_cast<float>(ray.y())};
       low_ = low_.cwiseMin(ray.head<2>().cast<float>());
       high_ = high_.cwiseMax(ray.head<2>().cast<float>());
     }

@@ -14,10 +14,14 @@
 namespace roslam {
 
 namespace {
-// Version 2 has the measurement noise at the end. A map of which none is known is written in version 1, so
-// that earlier programs read it.
-constexpr BinaryFormat kFormat{"ROSLAMMP", 2, "a map", 2047ULL * 1024 * 1024, 1};
-constexpr BinaryFormat kFormatWithoutNoise{"ROSLAMMP", 1, "a map", 2047ULL * 1024 * 1024};
+// Version 2 has the measurement noise at the end, version 3 the lens after it. A map is written in the lowest
+// version that holds it, so that earlier programs read it.
+constexpr std::uint32_t kWithoutNoise = 1, kWithNoise = 2, kWithLens = 3;
+constexpr std::size_t kFirstCoefficients = 5;  // of the lens, in every version
+
+constexpr BinaryFormat format(std::uint32_t version) {
+  return {"ROSLAMMP", version, "a map", 2047ULL * 1024 * 1024, kWithoutNoise};
+}
 constexpr std::size_t kPointBytes = 8 + 4 + 1 + 4 + 3 + sizeof(Descriptor) + 1;
 constexpr std::size_t kWordBytes = 4 + 4;
 constexpr std::size_t kObservationBytes = 4 + 4;
@@ -48,7 +52,7 @@ void put(BinaryWriter& writer, const Camera& camera) {
   writer.put(static_cast<std::int32_t>(camera.width));
   writer.put(static_cast<std::int32_t>(camera.height));
   for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) writer.put(value);
-  for (const double value : camera.distortion) writer.put(value);
+  for (std::size_t i = 0; i < kFirstCoefficients; ++i) writer.put(camera.distortion[i]);
   writer.put(camera.depth_units_per_metre);
   writer.put(camera.fps);
 }
@@ -122,6 +126,19 @@ void put_noise(BinaryWriter& writer, const SavedMap& saved) {
   }
 }
 
+std::uint32_t version_of(const SavedMap& saved) {
+  const Camera& camera = saved.camera;
+  if (camera.model != LensModel::kPinhole || camera.coefficients().size() > kFirstCoefficients)
+    return kWithLens;
+  return has_noise(saved) ? kWithNoise : kWithoutNoise;
+}
+
+void put_lens(BinaryWriter& writer, const Camera& camera) {
+  writer.put(static_cast<std::uint32_t>(camera.model));
+  for (std::size_t i = kFirstCoefficients; i < camera.distortion.size(); ++i)
+    writer.put(camera.distortion[i]);
+}
+
 // Decodes a map and validates every value, so that any file gives a valid map or an error.
 class Decoder {
  public:
@@ -131,7 +148,6 @@ class Decoder {
     SavedMap saved;
     saved.name = in_.name();
     saved.camera = get_camera();
-    bounds_ = saved.camera.undistorted_bounds();
     saved.map = Map(get_scales());
     levels_ = saved.map.scales().size();
     saved.vocabulary = in_.get<std::uint64_t>();
@@ -155,7 +171,11 @@ class Decoder {
       saved.map.add_loop(from, to, get_motion());
     }
     if (in_.left() > 0) get_noise(saved.camera, views);
+    if (in_.left() > 0) get_lens(saved.camera);
     require(in_.left() == 0, "it has data after its end");
+    require_valid(saved.camera);
+    const std::array<double, 4> bounds = saved.camera.undistorted_bounds();
+    for (const auto& view : views) view->grid = FeatureGrid(view->pixels, bounds);
     return saved;
   }
 
@@ -202,10 +222,9 @@ class Decoder {
     camera.width = in_.get<std::int32_t>();
     camera.height = in_.get<std::int32_t>();
     for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *value = in_.get<double>();
-    for (double& value : camera.distortion) value = in_.get<double>();
+    for (std::size_t i = 0; i < kFirstCoefficients; ++i) camera.distortion[i] = get_finite<double>();
     camera.depth_units_per_metre = in_.get<double>();
     camera.fps = in_.get<double>();
-    require_valid(camera);
     return camera;
   }
 
@@ -239,7 +258,14 @@ class Decoder {
       if (const double sigma = get_sigma(); sigma > 0.0) view->pixel_sigma = sigma;
       view->depth_noise = get_depth_noise();
     }
-    require_valid(camera);
+  }
+
+  void get_lens(Camera& camera) {
+    const auto model = in_.get<std::uint32_t>();
+    require(model <= static_cast<std::uint32_t>(LensModel::kFisheye), "its camera has an unknown lens model");
+    camera.model = static_cast<LensModel>(model);
+    for (std::size_t i = kFirstCoefficients; i < camera.distortion.size(); ++i)
+      camera.distortion[i] = get_finite<double>();
   }
 
   void require_valid(const Camera& camera) const {
@@ -270,7 +296,6 @@ class Decoder {
       has_movable = has_movable || view->is_movable.back();
     }
     if (!has_movable) view->is_movable.clear();
-    view->grid = FeatureGrid(view->pixels, bounds_);
     return view;
   }
 
@@ -334,7 +359,6 @@ class Decoder {
   }
 
   BinaryReader in_;
-  std::array<double, 4> bounds_{};  // of undistorted pixels
   std::size_t levels_ = 0;
 };
 }  // namespace
@@ -362,7 +386,9 @@ std::string encode_map(const SavedMap& saved) {
     writer.put(loop.to.value);
     put(writer, loop.T_to_from);
   }
-  if (has_noise(saved)) put_noise(writer, saved);
+  const std::uint32_t version = version_of(saved);
+  if (version >= kWithNoise) put_noise(writer, saved);
+  if (version >= kWithLens) put_lens(writer, saved.camera);
   return std::move(writer).bytes();
 }
 
@@ -371,11 +397,11 @@ SavedMap decode_map(std::string_view content, const std::string& name) {
 }
 
 void save_map(const std::filesystem::path& file, const SavedMap& saved) {
-  write_binary(file, has_noise(saved) ? kFormat : kFormatWithoutNoise, encode_map(saved));
+  write_binary(file, format(version_of(saved)), encode_map(saved));
 }
 
 SavedMap load_map(const std::filesystem::path& file) {
-  return decode_map(read_binary(file, kFormat), file.string());
+  return decode_map(read_binary(file, format(kWithLens)), file.string());
 }
 
 }  // namespace roslam

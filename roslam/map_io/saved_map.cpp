@@ -20,7 +20,7 @@ bool have_same_projection(const Camera& a, const Camera& b) {
     return std::abs(x - y) <= 1e-9 * std::max(1.0, std::abs(x));
   };
   return a.width == b.width && a.height == b.height && is_close(a.fx, b.fx) && is_close(a.fy, b.fy) &&
-         is_close(a.cx, b.cx) && is_close(a.cy, b.cy) &&
+         is_close(a.cx, b.cx) && is_close(a.cy, b.cy) && a.model == b.model &&
          std::equal(a.distortion.begin(), a.distortion.end(), b.distortion.begin(), is_close);
 }
 

@@ -40,6 +40,25 @@ SE3 pose_of(RosReader& reader) {
     throw InputError("pose that is not finite or has no unit quaternion");
   return {rotation.normalized(), translation};
 }
+
+// Models as ROS and the RealSense SDK name them. The SDK's own projection applies the inverse of Brown's
+// model forward, and realsense-ros publishes it as plumb_bob as well.
+void set_lens(const RosCameraInfo& info, Camera& camera) {
+  const std::string& model = info.model;
+  const bool is_pinhole =
+      model == "plumb_bob" || model == "rational_polynomial" || model.ends_with("Brown Conrady");
+  const bool is_fisheye = model == "equidistant" || model == "fisheye" || model == "Kannala Brandt4";
+  if (!is_pinhole && !is_fisheye)
+    throw CalibrationError("camera_info has a lens of the model '" + model + "', which is not supported");
+  std::vector<double> coefficients = info.distortion;
+  constexpr std::size_t kOfFisheye = 4;
+  if (is_fisheye && coefficients.size() > kOfFisheye) coefficients.resize(kOfFisheye);  // padded by zeros
+  try {
+    camera.set_lens(is_fisheye ? "fisheye" : "pinhole", coefficients);
+  } catch (const InputError& error) {
+    throw CalibrationError(std::string("camera_info: ") + error.what());
+  }
+}
 }  // namespace
 
 std::string plain_type(std::string_view type) {
@@ -145,16 +164,7 @@ Camera camera_of(const RosCameraInfo& info, bool is_rectified) {
   }
   const bool is_undistorted =
       std::all_of(info.distortion.begin(), info.distortion.end(), [](double value) { return value == 0.0; });
-  // The RealSense SDK names its models itself; its own projection applies the inverse one forward
-  // (realsense-ros publishes it as plumb_bob as well).
-  const bool is_brown = info.model == "plumb_bob" || info.model == "Brown Conrady" ||
-                        info.model == "Inverse Brown Conrady" || info.model == "Modified Brown Conrady";
-  if (!is_undistorted) {
-    if (!is_brown || info.distortion.size() > camera.distortion.size())
-      throw CalibrationError("camera_info has a lens of the model '" + info.model +
-                             "', which is not supported; give a camera with --camera");
-    std::copy(info.distortion.begin(), info.distortion.end(), camera.distortion.begin());
-  }
+  if (!is_undistorted) set_lens(info, camera);
   camera.validate();
   return camera;
 }

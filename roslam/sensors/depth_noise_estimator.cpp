@@ -56,8 +56,9 @@ float smooth_depth(const cv::Mat& depth, const cv::Point& pixel) {
 DepthNoiseEstimator::DepthNoiseEstimator(const Camera& camera) : camera_(camera) {
   for (int y = kStep / 2; y < camera.height; y += kStep) {
     for (int x = kStep / 2; x < camera.width; x += kStep) {
-      const Eigen::Vector2d undistorted = camera.undistort({x, y});
-      grid_.push_back({camera.unproject(undistorted, 1.0).cast<float>(), {x, y}});
+      const auto undistorted = camera.try_undistort(Eigen::Vector2d(x, y));
+      if (!undistorted) continue;
+      grid_.push_back({camera.unproject(*undistorted, 1.0).cast<float>(), {x, y}});
     }
   }
 }

@@ -68,7 +68,8 @@ DepthRegistration::DepthRegistration(const Camera& depth, const Camera& colour, 
     throw CalibrationError("the transform from the depth to the colour camera is not finite");
   const bool is_one_place = T_colour_depth.translation().norm() < 1e-6 && T_colour_depth.angle() < 1e-6;
   is_identity_ = is_one_place && from_ == to_ && depth.fx == colour.fx && depth.fy == colour.fy &&
-                 depth.cx == colour.cx && depth.cy == colour.cy && depth.distortion == colour.distortion;
+                 depth.cx == colour.cx && depth.cy == colour.cy && depth.model == colour.model &&
+                 depth.distortion == colour.distortion;
   if (is_identity_) return;
   Eigen::Matrix3d K;
   K << colour.fx, 0.0, colour.cx, 0.0, colour.fy, colour.cy, 0.0, 0.0, 1.0;

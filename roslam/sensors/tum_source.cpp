@@ -78,7 +78,8 @@ TumSource::TumSource(const std::filesystem::path& folder, const Camera& camera, 
   }
   if (!(camera.depth_units_per_metre > 0.0)) {
     throw CalibrationError("camera calibration: depth_units_per_metre is not set; " +
-                           std::string(usual_depth_units()));
+                           std::string(usual_depth_units()) +
+                           "; roslam camera convert --depth-units adds it to a camera file");
   }
   open_lists();
   pair_with_depth();

@@ -104,7 +104,11 @@ void FrontEnd::extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& m
     forbidden = forbidden.empty() ? mask : cv::Mat(forbidden | mask);
     if (!still.empty()) still = still & ~(mask != 0);
   }
-  const auto features = extractor_.extract(grey, forbidden, still, &result.removed_points);
+  auto features = extractor_.extract(grey, forbidden, still, &result.removed_points);
+  // Beyond the part of the image that the lens model covers.
+  std::erase_if(features, [&](const OrbFeature& feature) {
+    return !camera_.try_undistort(Eigen::Vector2d(feature.pixel.x, feature.pixel.y));
+  });
   for (const auto& feature : features) {
     if (!feature.is_in_part) result.points.push_back(feature.pixel);
   }

@@ -240,8 +240,9 @@ std::unique_ptr<TumSource> open_folder(const SourceArguments& arguments) {
                      std::string(name_of(*dataset_format(arguments.name))) +
                      ", and this needs a folder in the TUM RGB-D format");
   if (arguments.camera.empty()) {
-    throw InputError(arguments.name +
-                     ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455) or a file");
+    throw InputError(
+        arguments.name +
+        ": needs --camera with a preset (tum-fr1 tum-fr2 tum-fr3 7scenes bonn d435 d455) or a file");
   }
   refuse_frames(arguments);
   return std::make_unique<TumSource>(arguments.name, with_mount(load_camera(arguments.camera), arguments));
