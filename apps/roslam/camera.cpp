@@ -56,7 +56,7 @@ ImportedCamera camera_of(const CameraArguments& arguments) {
   if (camera.depth_units_per_metre == 0.0)
     imported.notes.push_back("depth_units_per_metre is not set, which 16-bit depth images need; " +
                              std::string(usual_depth_units()) + " (--depth-units)");
-  if (imported.format == "a preset" && (arguments.camera == "d455" || arguments.camera == "d435"))
+  if (imported.format == "a preset" && arguments.camera == "d455")
     imported.notes.push_back(
         "this preset has no lens distortion. The colour lens of a real D455 has some, 2 to 4 pixels towards "
         "the "
