@@ -139,6 +139,12 @@ TEST_F(Killed, ARunIsTakenUpAgain) {
   EXPECT_EQ(report["map"]["recognised"], true);
   EXPECT_EQ(report["finished"], true);
   EXPECT_EQ(content(run / "sessions/1/odometry.csv"), first) << "the earlier session is kept";
+  const Outcome evaluated = run_program("evaluate odometry --json '" + run.string() + "'", scratch_);
+  ASSERT_EQ(evaluated.code, 0) << evaluated.error;
+  const auto odometry = nlohmann::json::parse(evaluated.out)["runs"][0];
+  EXPECT_EQ(odometry["frames"], report["frames"]["with_pose"]);
+  EXPECT_LT(odometry["step_rmse_m"], 0.01);
+  EXPECT_LT(odometry["tilt_deg"], 3.0) << "by the mount in run.json";
   ASSERT_EQ(fly({"--resume", run.string()}, 0), 0);
   EXPECT_TRUE(fs::exists(run / "sessions/2/trajectory.txt"));
   EXPECT_EQ(content(run / "sessions/1/odometry.csv"), first);

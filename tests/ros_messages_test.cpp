@@ -124,6 +124,13 @@ TEST_P(Messages, ACalibration) {
   zeros.fx = zeros.fy = zeros.cx = zeros.cy = 0.0;
   const Bytes uncalibrated = ros::camera_info(GetParam(), kStamp, "camera", zeros);
   EXPECT_THROW(camera_of(decode_camera_info(uncalibrated, encoding())), CalibrationError);
+  const auto lens_of = [&](const char* model) {
+    const Bytes of_model = ros::camera_info(GetParam(), kStamp, "camera", camera, model);
+    return camera_of(decode_camera_info(of_model, encoding())).model;
+  };
+  for (const char* model : {"plumb_bob", "Brown Conrady", "Inverse Brown Conrady"})
+    EXPECT_EQ(lens_of(model), LensModel::kPinhole) << model;
+  EXPECT_EQ(lens_of("equidistant"), LensModel::kFisheye);
   const Bytes odd = ros::camera_info(GetParam(), kStamp, "camera", camera, "kannala_of_nowhere");
   EXPECT_THROW(camera_of(decode_camera_info(odd, encoding())), CalibrationError);
 }

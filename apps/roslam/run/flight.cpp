@@ -44,7 +44,7 @@ void require_poses(const Slam& slam, const RunResults& summary, const FrameSourc
   const std::string reasons = skipped + in_words(source.skipped_depth());
   if (summary.without_depth == slam.frames()) {
     throw InputError(name + ": no frame could be tracked, none has depth" + reasons +
-                     "; RGB-D tracking needs depth images, 16 bit, within 20 ms of the colour images");
+                     "; RGB-D tracking needs a depth image near in time to each colour image");
   }
   throw InputError(name + ": no frame could be tracked" + reasons + "; tracking starts at an image with " +
                    std::to_string(slam.options().tracker.min_initial_points) +

@@ -52,7 +52,7 @@ CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
       "OpenLORIS), recording (ROS 1 bag, rosbag2 file or folder, MCAP), or simulated:street, simulated:loop, "
       "simulated:hover, simulated:turn, simulated:corridor");
   command.add_option("--camera", arguments.camera,
-                     "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 7scenes d435 d455 simulated) "
+                     "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 bonn 7scenes d435 d455 simulated) "
                      "or a YAML file; not "
                      "needed where the source knows it");
   return source;
