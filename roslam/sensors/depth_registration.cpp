@@ -52,10 +52,13 @@ struct DepthRegistration::Row {
         right(left.size()),
         top(left.size()),
         bottom(left.size()),
+        x(left.size()),
+        y(left.size()),
         z(left.size()) {}
 
   std::vector<int> left, right, top, bottom;
-  std::vector<float> z;  // depth in the colour camera, metres; not positive: unknown
+  std::vector<float> x, y;  // of one corner of each
+  std::vector<float> z;     // depth in the colour camera, metres; not positive: unknown
 };
 
 DepthRegistration::DepthRegistration(const Camera& depth, const Camera& colour, const SE3& T_colour_depth)
@@ -115,47 +118,54 @@ void DepthRegistration::measure_seams() {
   seam_y_ = std::min(seam_y_, kHalf);
 }
 
-// To the raw image; bilinear between the pixels of the table, and as at its border beyond it.
-Eigen::Vector2f DepthRegistration::distort(float x, float y) const {
-  const float column = std::min(static_cast<float>(displacement_.cols - 2), std::max(0.0F, x + kMargin));
-  const float row = std::min(static_cast<float>(displacement_.rows - 2), std::max(0.0F, y + kMargin));
-  const int c = static_cast<int>(column), r = static_cast<int>(row);
-  const float a = column - static_cast<float>(c), b = row - static_cast<float>(r);
-  const auto* above = displacement_.ptr<cv::Vec2f>(r) + c;
-  const auto* below = displacement_.ptr<cv::Vec2f>(r + 1) + c;
-  const cv::Vec2f moved =
-      (above[0] * (1.0F - a) + above[1] * a) * (1.0F - b) + (below[0] * (1.0F - a) + below[1] * a) * b;
-  return {x + moved[0], y + moved[1]};
+// To the raw image, by the nearest pixel of the table, between which the displacement hardly differs, and as
+// at its border beyond it.
+void DepthRegistration::distort(std::vector<float>& x, std::vector<float>& y) const {
+  const auto right = static_cast<float>(displacement_.cols - 1),
+             bottom = static_cast<float>(displacement_.rows - 1);
+  constexpr float kCentre = kMargin + 0.5F;
+  for (std::size_t u = 0; u < x.size(); ++u) {
+    const int column = static_cast<int>(std::min(right, std::max(0.0F, x[u] + kCentre)));
+    const int row = static_cast<int>(std::min(bottom, std::max(0.0F, y[u] + kCentre)));
+    const cv::Vec2f& moved = displacement_.at<cv::Vec2f>(row, column);
+    x[u] += moved[0];
+    y[u] += moved[1];
+  }
+}
+
+// Where one corner of each pixel of a row is in the colour image. corners: the first of them in the rays.
+void DepthRegistration::project_corners(const float* depth, std::size_t corners, Row& row) const {
+  const float *rx = x_.data() + corners, *ry = y_.data() + corners, *rz = z_.data() + corners;
+  const float ox = offset_.x(), oy = offset_.y(), oz = offset_.z();
+  float *x = row.x.data(), *y = row.y.data();
+  const std::size_t columns = row.x.size();
+  for (std::size_t u = 0; u < columns; ++u) {
+    const float scale = 1.0F / std::max(kNearest, depth[u] * rz[u] + oz);
+    x[u] = std::min(kFar, std::max(-kFar, (depth[u] * rx[u] + ox) * scale));
+    y[u] = std::min(kFar, std::max(-kFar, (depth[u] * ry[u] + oy) * scale));
+  }
+  if (has_distortion_) distort(row.x, row.y);
 }
 
 void DepthRegistration::project(const float* depth, int row, Row& projected) const {
   const auto columns = static_cast<std::size_t>(from_.width);
   const std::size_t above = static_cast<std::size_t>(row) * (columns + 1), below = above + columns + 2;
-  const float* centre_z = centre_z_.data() + static_cast<std::size_t>(row) * columns;
-  const float ox = offset_.x(), oy = offset_.y(), oz = offset_.z();
-  const auto project_corners = [&](std::size_t corners, float aside_x, float aside_y, std::vector<int>& to_x,
-                                   std::vector<int>& to_y) {
-    const float *rx = x_.data() + corners, *ry = y_.data() + corners, *rz = z_.data() + corners;
-    if (has_distortion_) {
-      for (std::size_t u = 0; u < columns; ++u) {
-        const float scale = 1.0F / std::max(kNearest, depth[u] * rz[u] + oz);
-        const Eigen::Vector2f raw = distort((depth[u] * rx[u] + ox) * scale, (depth[u] * ry[u] + oy) * scale);
-        to_x[u] = round_up(std::min(kFar, std::max(-kFar, raw.x() + aside_x)));
-        to_y[u] = round_up(std::min(kFar, std::max(-kFar, raw.y() + aside_y)));
-      }
-      return;
-    }
-    int *x = to_x.data(), *y = to_y.data();
-    for (std::size_t u = 0; u < columns; ++u) {
-      const float scale = 1.0F / std::max(kNearest, depth[u] * rz[u] + oz);
-      x[u] = round_up(std::min(kFar, std::max(-kFar, (depth[u] * rx[u] + ox) * scale + aside_x)));
-      y[u] = round_up(std::min(kFar, std::max(-kFar, (depth[u] * ry[u] + oy) * scale + aside_y)));
-    }
+  const auto round_all = [](const std::vector<float>& from, float aside, std::vector<int>& to) {
+    const float* in = from.data();
+    int* out = to.data();
+    const std::size_t count = from.size();
+    for (std::size_t u = 0; u < count; ++u) out[u] = round_up(in[u] + aside);
   };
-  project_corners(above, -seam_x_, -seam_y_, projected.left, projected.top);
-  project_corners(below, seam_x_, seam_y_, projected.right, projected.bottom);
-  for (std::size_t u = 0; u < columns; ++u)
-    projected.z[u] = depth[u] > 0.0F ? depth[u] * centre_z[u] + oz : 0.0F;
+  project_corners(depth, above, projected);
+  round_all(projected.x, -seam_x_, projected.left);
+  round_all(projected.y, -seam_y_, projected.top);
+  project_corners(depth, below, projected);
+  round_all(projected.x, seam_x_, projected.right);
+  round_all(projected.y, seam_y_, projected.bottom);
+  const float* centre_z = centre_z_.data() + static_cast<std::size_t>(row) * columns;
+  const float oz = offset_.z();
+  float* z = projected.z.data();
+  for (std::size_t u = 0; u < columns; ++u) z[u] = depth[u] > 0.0F ? depth[u] * centre_z[u] + oz : 0.0F;
 }
 
 cv::Mat DepthRegistration::operator()(const cv::Mat& depth) const {

@@ -36,7 +36,8 @@ class ROSLAM_EXPORT DepthRegistration {
   struct Row;
   void project(const float* depth, int row, Row& projected) const;
   void measure_seams();
-  Eigen::Vector2f distort(float x, float y) const;
+  void distort(std::vector<float>& x, std::vector<float>& y) const;
+  void project_corners(const float* depth, std::size_t corners, Row& row) const;
 
   cv::Size from_, to_;
   bool is_identity_ = false;
