@@ -152,7 +152,8 @@ OdometryError evaluate_odometry(const Trajectory& truth, const std::vector<Odome
     throw InputError("only " + std::to_string(error.compared) + " of " + std::to_string(error.frames) +
                      " frames with odometry lie within the truth; is it of the same recording?");
   compare_steps(odometry, poses, interval, error);
-  error.resets = odometry.back().resets - odometry.front().resets;
+  const std::size_t first = odometry.front().resets, last = odometry.back().resets;
+  error.resets = last > first ? last - first : 0;
   error.delay = delay_of(odometry, poses, interval);
   error.tilt = tilt_of(odometry, poses);
   return error;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <fstream>
 #include <initializer_list>
 #include <optional>
@@ -89,7 +90,8 @@ std::vector<std::string_view> fields_of(std::string_view line) {
 std::optional<double> number_of(std::string_view field) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (error != std::errc() || end != field.data() + field.size()) return std::nullopt;
+  if (error != std::errc() || end != field.data() + field.size() || !std::isfinite(value))
+    return std::nullopt;
   return value;
 }
 
@@ -101,7 +103,8 @@ std::optional<Odometry> odometry_of(const std::vector<std::string_view>& fields)
     values[i] = *value;
   }
   const auto timestamp = number_of(fields[0]);
-  if (!timestamp || values[0] < 0.0) return std::nullopt;
+  constexpr double kMostResets = 1e9;
+  if (!timestamp || !(values[0] >= 0.0 && values[0] <= kMostResets)) return std::nullopt;
   Numbers numbers(values);
   Odometry result;
   result.timestamp = *timestamp;

@@ -187,6 +187,20 @@ TEST_F(RecordingFrames, RegisterDepthOfAnotherCameraByTf) {
       1U);
 }
 
+TEST_F(RecordingFrames, KeepDepthThatIsRegisteredWhateverTheCameraOfTheUser) {
+  add_camera(6);
+  Camera better = small_camera();
+  better.fx = better.fy = 57.0;
+  better.set_lens("pinhole", {0.1, -0.05, 0.001, 0.0, 0.0});
+  better.depth_units_per_metre = 1000.0;
+  const auto source = open({}, better);
+  EXPECT_FALSE(source->streams().T_colour_depth);
+  const auto frames = all(*source);
+  ASSERT_EQ(frames.size(), 6U);
+  EXPECT_LT(cv::norm(frames[2].depth, cv::Mat(48, 64, CV_32FC1, cv::Scalar(1.002)), cv::NORM_INF), 1e-6)
+      << "as recorded";
+}
+
 TEST_F(RecordingFrames, CarryInertialSamplesAndTruth) {
   add_camera(10);
   const int tf = topic("/tf_static", "tf2_msgs/TFMessage"), imu = topic("/imu/data", "sensor_msgs/Imu"),
@@ -231,6 +245,29 @@ TEST_F(RecordingFrames, BeginASegmentWhereTheClockRestarts) {
     ASSERT_FALSE(frames[i].depth.empty()) << i;
     EXPECT_FLOAT_EQ(frames[i].depth.at<float>(0, 0), 0.001F * static_cast<float>(1000 + i));
   }
+}
+
+TEST_F(RecordingFrames, AStampFromTheFutureCostsOneImage) {
+  const int colour = topic("/rgb/image", "sensor_msgs/Image"),
+            depth = topic("/depth/image", "sensor_msgs/Image");
+  for (int i = 0; i < 30; ++i) {
+    const std::int64_t t = kBegin + i * kFrame;
+    put(colour, i * kFrame,
+        ros::image(kVersion, t + (i == 7 ? 100 * kFrame : 0), "", "bgr8", colour_image(i)));
+    put(depth, i * kFrame + 1,
+        ros::image(kVersion, t + (i == 15 ? 1000 * kFrame : 0), "", "16UC1", depth_image(i)));
+  }
+  const auto source = open({}, small_camera());
+  const auto frames = all(*source);
+  ASSERT_GE(frames.size(), 29U);
+  std::size_t with_depth = 0;
+  for (const Frame& frame : frames) {
+    EXPECT_EQ(frame.segment, 0);
+    if (frame.depth.empty()) continue;
+    ++with_depth;
+    EXPECT_FLOAT_EQ(frame.depth.at<float>(0, 0), 0.001F * static_cast<float>(1000 + frame.index));
+  }
+  EXPECT_GE(with_depth, 28U);
 }
 
 TEST_F(RecordingFrames, OutOfOrderAreSkippedAndCounted) {

@@ -161,6 +161,17 @@ TEST_P(Messages, Poses) {
               ros::tf(GetParam(), kStamp, {{"a", "b", SE3()}, {"world", "body of some length", pose}}),
               "body of some length");
   EXPECT_FALSE(decode_transforms("std_msgs/String", Bytes(40), encoding()));
+  // One that is no pose costs only itself.
+  const SE3 none = SE3::from_parts(Eigen::Quaterniond(0, 0, 0, 0), Eigen::Vector3d::Zero());
+  const auto rest =
+      decode_transforms("tf2_msgs/TFMessage",
+                        ros::tf(GetParam(), kStamp, {{"a", "b", none}, {"world", "c", pose}}), encoding());
+  ASSERT_TRUE(rest);
+  ASSERT_EQ(rest->size(), 1U);
+  EXPECT_EQ(rest->front().child, "c");
+  EXPECT_THROW(decode_transforms("geometry_msgs/PoseStamped",
+                                 ros::pose_stamped(GetParam(), kStamp, "world", none), encoding()),
+               InputError);
   ros::Writer claims_many(GetParam());
   claims_many.put(std::uint32_t{4000000000U});
   EXPECT_THROW(decode_transforms("tf2_msgs/TFMessage", claims_many.take(), encoding()), InputError);
@@ -239,6 +250,15 @@ TEST(RosImages, RowsMayBePaddedButNotShort) {
   EXPECT_THROW(decode_image(put(5, 8, 15), RosEncoding::kRos1), InputError);
   EXPECT_THROW(decode_image(put(4000000000U, 8, 16), RosEncoding::kRos1), InputError);
   EXPECT_THROW(decode_image(put(0, 8, 16), RosEncoding::kRos1), InputError);
+  ros::Writer odd(Version::kRos1);  // rows that end within a pixel
+  odd.put_header(0, "");
+  odd.put(std::uint32_t{2});
+  odd.put(std::uint32_t{3});
+  odd.put_text("16UC1");
+  odd.put(std::uint8_t{0});
+  odd.put(std::uint32_t{7});
+  odd.put_bytes(Bytes(14, 1));
+  EXPECT_THROW(depth_pixels(decode_image(odd.take(), RosEncoding::kRos1), 1000.0), InputError);
 }
 
 TEST(RosTime, IsRoundedAsADecimalNumberIs) {
@@ -268,6 +288,12 @@ TEST(FrameTree, JoinsFramesOverTheirCommonParent) {
   EXPECT_LT(((*tree.transform("imu", "colour")) * *found).log().norm(), 1e-12);
   EXPECT_FALSE(tree.transform("colour", "elsewhere"));
   EXPECT_TRUE(tree.transform("elsewhere", "elsewhere"));
+  tree.add("base", "gimbal", T_mast_imu, false);
+  EXPECT_TRUE(tree.transform("colour", "gimbal"));
+  tree.add("base", "gimbal", T_base_mast, false);  // it moves
+  EXPECT_FALSE(tree.transform("colour", "gimbal"));
+  tree.add("base", "mast", T_mast_imu, false);  // said to be fixed before
+  EXPECT_LT((tree.transform("colour", "imu")->inverse() * *found).log().norm(), 1e-12);
   tree.add("a", "b", SE3());
   tree.add("b", "a", SE3());  // a circle
   EXPECT_FALSE(tree.transform("a", "colour"));

@@ -46,7 +46,7 @@ Gaps gaps_of(const RecordedImages& images) {
   Gaps gaps;
   const double rate = images.rate();
   for (std::size_t i = 1; rate > 0.0 && i < images.stamps.size(); ++i) {
-    const double step = static_cast<double>(images.stamps[i] - images.stamps[i - 1]) * 1e-9;
+    const double step = (seconds_of(images.stamps[i]) - seconds_of(images.stamps[i - 1]));
     if (step * rate <= kGap) continue;
     ++gaps.count;
     gaps.longest = std::max(gaps.longest, step);
@@ -90,7 +90,7 @@ Taken taken_of(const RecordingContents& contents, const std::string& file) {
 
 double seconds_of_range(const Recording& recording) {
   const auto range = recording.time_range();
-  return range ? static_cast<double>(range->second - range->first) * 1e-9 : 0.0;
+  return range ? (static_cast<double>(range->second) - static_cast<double>(range->first)) * 1e-9 : 0.0;
 }
 
 void print(const Recording& recording, const RecordingContents& contents, const Taken& taken) {

@@ -62,11 +62,10 @@ std::unique_ptr<FrameSource> open_source_of(const RecordedRun& run) {
   if (is_simulated)
     return std::make_unique<SimulatedSource>(
         *simulated_flight(flight_from_words(run.source(), run.flight())));
-  if (is_recording(run.source()))
+  if (is_recorded(run.source()))
     return std::make_unique<RecordingSource>(
         run.source(), flight_from_words(run.source(), run.flight()).topics, run.camera());
-  if (!TumSource::recognises(run.source()) && dataset_format(run.source()))
-    return open_dataset(run.source(), run.camera());
+  if (is_other_dataset(run.source())) return open_dataset(run.source(), run.camera());
   return std::make_unique<TumSource>(run.source(), run.camera());
 }
 
@@ -220,7 +219,7 @@ void restore(RestoreArguments arguments, const std::string& version) {
 // Options of the source are recorded in the run and must not contradict it.
 void require_no_flight_options(const CLI::App& command) {
   for (const char* name : {"--camera", "--traffic", "--frames", "--seed", "--speed", "--altitude", "--aside",
-                           "--fps", "--gusts", "--gain"})
+                           "--fps", "--gusts", "--gain", "--colour", "--depth", "--truth", "--imu"})
     if (command.count(name) > 0) throw CLI::ValidationError(name, "is known from the run; leave it out");
 }
 }  // namespace
@@ -244,6 +243,7 @@ void add_restore_command(CLI::App& program, const std::string& version) {
       "Ctrl-C ends it early and keeps the frames restored so far.\n"
       "Exit code: 0 success, 1 an error in the input, 2 wrong usage.");
   add_source_options(*command, arguments->flight.source)->required();
+  add_topic_options(*command, arguments->flight.source);
   command->add_option("--out", arguments->out, "Folder the sequence is written to; made if it does not exist")
       ->required();
   command

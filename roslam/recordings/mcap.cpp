@@ -114,7 +114,7 @@ void McapFile::scan(std::uint64_t begin, std::uint64_t end) {
   };
   while (at < end) {
     const auto head = head_at(file_, at);
-    if (!head || head->size > end - head->content) {
+    if (!head || head->content > end || head->size > end - head->content) {
       note("the file is truncated or damaged; what follows was left out");
       end_run();
       if (head && head->operation == kChunk) add_unindexed(at, 0);

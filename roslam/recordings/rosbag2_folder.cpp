@@ -59,6 +59,7 @@ Rosbag2Folder::Rosbag2Folder(const fs::path& folder) : folder_(folder), topics_(
   std::vector<fs::path> files = listed_files(metadata_of(folder));
   if (files.empty()) files = parts_by_number(folder);
   for (const fs::path& file : files) add(file);
+  if (parts_.empty() && !unread_.empty()) throw InputError(unread_);
   if (parts_.empty())
     throw InputError(folder.string() +
                      ": no .db3 or .mcap file in it; give the folder that rosbag2 recorded");
@@ -88,8 +89,16 @@ std::vector<fs::path> Rosbag2Folder::listed_files(const std::string& metadata) {
   return files;
 }
 
+// The last file of a recording that was cut may not be readable at all.
 void Rosbag2Folder::add(const fs::path& file) {
-  const std::unique_ptr<Recording> recording = open_recording(file);
+  std::unique_ptr<Recording> recording;
+  try {
+    recording = open_recording(file);
+  } catch (const InputError& error) {
+    if (unread_.empty()) unread_ = error.what();
+    ++notes_["file that cannot be read, left out"];
+    return;
+  }
   Part part{file, {}, recording->notes(), recording->notes()};
   for (const RecordedTopic& topic : recording->topics()) part.topics.push_back(topics_.add(topic));
   parts_.push_back(std::move(part));

@@ -53,6 +53,7 @@ class Rosbag2Folder : public Recording {
   std::unique_ptr<Recording> current_;
   std::size_t part_ = 0;                      // that current_ is of
   std::map<std::string, std::size_t> notes_;  // of the folder itself
+  std::string unread_;                        // why the first file that cannot be read cannot
 };
 
 }  // namespace roslam

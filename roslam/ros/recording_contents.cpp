@@ -12,6 +12,8 @@ namespace {
 constexpr std::size_t kEnoughImages = 30;        // of each topic, to know its rate
 constexpr std::size_t kMostBytes = 500U << 20U;  // that are looked at for the beginning
 
+constexpr std::size_t kMostFaults = 100;  // of different kinds
+
 // Rates are not exact: clocks drift, and times are rounded.
 double nearly_whole(double value, double tolerance) {
   const double whole = std::round(value);
@@ -45,6 +47,8 @@ class Survey {
       } catch (const Error& error) {
         if (const auto images = images_.find(topic.id); images != images_.end())
           ++contents_.images[images->second].faults[error.what()];
+        else if (contents_.faults.size() < kMostFaults)
+          ++contents_.faults[topic.name + ": " + error.what()];
       }
       if (part_ == LookAt::kBeginning && (bytes > kMostBytes || knows_enough())) {
         contents_.is_whole = false;
@@ -110,13 +114,10 @@ class Survey {
     if (type == "sensor_msgs/CameraInfo") {
       infos_.try_emplace(topic.name, decode_camera_info(message, encoding_of(topic)));
     } else if (const auto transforms = decode_transforms(type, message, encoding_of(topic))) {
-      // Old recordings tell of fixed frames in /tf as well; what is in both is taken from /tf_static.
+      // Old recordings tell of fixed frames in /tf as well.
       const bool is_static = topic.name.ends_with("tf_static");
-      for (const RosTransform& t : *transforms) {
-        if (is_static) fixed_.insert(t.child);
-        if (is_static || !fixed_.contains(t.child))
-          contents_.frames.add(t.header.frame, t.child, t.T_parent_child);
-      }
+      for (const RosTransform& t : *transforms)
+        contents_.frames.add(t.header.frame, t.child, t.T_parent_child, is_static);
     }
   }
 
@@ -168,7 +169,6 @@ class Survey {
   RecordingContents contents_;
   std::map<int, std::size_t> images_;  // by topic
   std::set<int> wanted_, awaited_;
-  std::set<std::string> fixed_;
   std::map<std::string, RosCameraInfo> infos_;  // by topic
   std::map<std::string, SE3> extrinsics_;       // by stream
   std::map<std::string, std::string> clocks_;   // likewise

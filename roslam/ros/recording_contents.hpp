@@ -46,8 +46,9 @@ struct RecordingContents {
   std::vector<RecordedTopic> poses;            ///< that may be ground truth
   std::vector<RecordedTopic> transforms;       ///< of tf
   FrameTree frames;
-  bool is_realsense = false;  ///< written by the RealSense SDK
-  bool is_whole = true;       ///< false: what follows the part that was looked at may differ
+  std::map<std::string, std::size_t> faults;  ///< messages of other topics that cannot be read, by reason
+  bool is_realsense = false;                  ///< written by the RealSense SDK
+  bool is_whole = true;                       ///< false: what follows the part that was looked at may differ
 };
 
 /// How much of a recording to look at.

@@ -12,9 +12,12 @@
 namespace roslam {
 
 namespace {
-constexpr std::size_t kMostWaiting = 60;               // images of a topic
-constexpr std::int64_t kClockRestart = 1'000'000'000;  // nanoseconds back, from which a clock has begun anew
-constexpr std::size_t kMostInertial = 4000;            // samples that may wait for an image
+constexpr std::size_t kMostWaiting = 60;  // images of a topic
+constexpr std::int64_t kClockRestart =
+    1'000'000'000;                                // nanoseconds back, from which a clock may have begun anew
+constexpr std::int64_t kOutlier = 5'000'000'000;  // that a clock may go on after a stamp that was none
+constexpr const char* kBack = "image whose time stamp is not after that of the one before";
+constexpr std::size_t kMostInertial = 4000;  // samples that may wait for an image
 constexpr std::size_t kMostPoses = 20000;
 constexpr double kMaxTruthGap = 0.2;  // seconds
 
@@ -27,6 +30,8 @@ std::pair<int, std::int64_t> order_of(const Image& image) {
 std::string size_in_words(const cv::Size& size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
+
+std::string plain_frame(const std::string& name) { return name.starts_with('/') ? name.substr(1) : name; }
 
 bool is_accelerometer(const RecordedTopic& topic) {
   std::string name = topic.name;
@@ -108,24 +113,50 @@ bool RecordingSource::read_message() {
   return true;
 }
 
+// A clock that goes back has restarted if the next image confirms it; a single image from the future or the
+// past does not count.
 void RecordingSource::put(const RecordedImages& images, std::span<const std::uint8_t> message, Queue& queue,
                           std::map<std::string, std::size_t>& skipped) {
-  const std::size_t index = queue.count++;
-  const std::int64_t stamp = decode_image_of(images, message, is_realsense_).header.stamp;
-  if (queue.last && stamp <= *queue.last) {
-    if (*queue.last - stamp < kClockRestart) {
-      ++skipped["image whose time stamp is not after that of the one before"];
-      return;
-    }
+  Waiting image;
+  image.index = queue.count++;
+  image.stamp = decode_image_of(images, message, is_realsense_).header.stamp;
+  image.message.assign(message.begin(), message.end());
+  auto candidate = std::exchange(queue.candidate, std::nullopt);
+  if (!queue.last || image.stamp > *queue.last) {
+    if (candidate) ++skipped[kBack];
+    return accept(std::move(image), queue, skipped);
+  }
+  if (*queue.last - image.stamp < kClockRestart) {
+    queue.candidate = std::move(candidate);
+    ++skipped[kBack];
+  } else if (queue.before && image.stamp > *queue.before && image.stamp - *queue.before < kOutlier) {
+    ++skipped["image with an implausible time stamp"];
+    if (!queue.images.empty() && queue.images.back().stamp == *queue.last) queue.images.pop_back();
+    queue.last = queue.before;
+    accept(std::move(image), queue, skipped);
+  } else if (candidate && image.stamp > candidate->stamp) {
     ++queue.segment;
     if (&queue == &colour_) ++notes_["the clock restarts; a new segment begins there"];
+    queue.last.reset();
+    accept(std::move(*candidate), queue, skipped);
+    accept(std::move(image), queue, skipped);
+  } else {
+    if (candidate) ++skipped[kBack];
+    queue.candidate = std::move(image);
   }
-  queue.last = stamp;
-  queue.images.push_back({stamp, queue.segment, index, {message.begin(), message.end()}});
-  if (queue.images.size() > kMostWaiting) {
-    ++skipped["no image near in time"];
-    queue.images.pop_front();
-  }
+}
+
+void RecordingSource::accept(Waiting image, Queue& queue, std::map<std::string, std::size_t>& skipped) {
+  // A step back of about a second may be a restart to one of the streams only.
+  const Queue& other = &queue == &colour_ ? depth_ : colour_;
+  const auto distance = other.last ? std::abs(image.stamp - *other.last) : kClockRestart;
+  if (queue.segment < other.segment && distance < kClockRestart) queue.segment = other.segment;
+  image.segment = queue.segment;
+  queue.before = std::exchange(queue.last, image.stamp);
+  queue.images.push_back(std::move(image));
+  if (queue.images.size() <= kMostWaiting) return;
+  ++skipped["no image near in time"];
+  queue.images.pop_front();
 }
 
 // The depth image nearest in time that is not nearer to the next colour image.
@@ -206,6 +237,9 @@ cv::Mat RecordingSource::depth_image(const Waiting& depth) {
 // A gyroscope of its own, whose samples come more often, is given the last acceleration.
 void RecordingSource::add_inertial(const RecordedTopic& topic, std::span<const std::uint8_t> message) {
   const RosImu imu = decode_imu(message, encoding_of(topic));
+  constexpr double kRestart = 1.0;  // seconds
+  if (!inertial_.empty() && seconds_of(imu.header.stamp) < inertial_.back().timestamp - kRestart)
+    inertial_.clear();
   const bool is_pair = streams_.inertial.size() > 1;
   if (is_pair && is_accelerometer(topic)) {
     acceleration_ = imu.acceleration;
@@ -229,8 +263,11 @@ void RecordingSource::add_truth(std::span<const std::uint8_t> message) {
   const auto transforms =
       decode_transforms(plain_type(streams_.truth->type), message, encoding_of(*streams_.truth));
   for (const RosTransform& transform : transforms.value_or(std::vector<RosTransform>{})) {
-    if (!streams_.truth_child.empty() && transform.child != streams_.truth_child) continue;
+    if (!streams_.truth_child.empty() && plain_frame(transform.child) != plain_frame(streams_.truth_child))
+      continue;
     const double time = seconds_of(transform.header.stamp);
+    constexpr double kRestart = 1.0;  // seconds
+    if (!truth_.empty() && time < truth_.back().timestamp - kRestart) truth_.clear();
     if (!truth_.empty() && time <= truth_.back().timestamp) continue;
     truth_.push_back({time, transform.T_parent_child * place_camera(transform.child)});
     if (truth_.size() > kMostPoses) truth_.pop_front();
@@ -260,6 +297,8 @@ std::map<std::string, std::size_t> RecordingSource::notes() const {
   auto notes = notes_;
   for (const auto* more : {&streams_.notes}) notes.insert(more->begin(), more->end());
   for (const auto& [note, count] : recording_->notes()) notes[note] += count;
+  if (streams_.truth && is_at_end_ && !T_child_camera_)
+    ++notes["no ground truth was found in " + streams_.truth->name];
   if (saturated_ > 0) notes["depth pixel at the end of the sensor's range, taken as unknown"] += saturated_;
   return notes;
 }

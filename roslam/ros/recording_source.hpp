@@ -52,7 +52,8 @@ class ROSLAM_EXPORT RecordingSource : public FrameSource {
   // The images of a topic that wait, and where its clock is.
   struct Queue {
     std::deque<Waiting> images;
-    std::optional<std::int64_t> last;  // stamp
+    std::optional<std::int64_t> last, before;  // the newest stamp, and that of the image before
+    std::optional<Waiting> candidate;          // may be the first after a restart of the clock
     int segment = 0;
     std::size_t count = 0;
   };
@@ -60,6 +61,7 @@ class ROSLAM_EXPORT RecordingSource : public FrameSource {
   bool read_message();
   void put(const RecordedImages& images, std::span<const std::uint8_t> message, Queue& queue,
            std::map<std::string, std::size_t>& skipped);
+  void accept(Waiting image, Queue& queue, std::map<std::string, std::size_t>& skipped);
   void add_inertial(const RecordedTopic& topic, std::span<const std::uint8_t> message);
   void add_truth(std::span<const std::uint8_t> message);
   bool is_decided() const;

@@ -24,6 +24,8 @@ bool has_any(const std::string& name, std::initializer_list<std::string_view> wo
                      [&](std::string_view word) { return text.find(word) != std::string::npos; });
 }
 
+constexpr int kRegistered = 30;  // score of depth from which on its name says that it is registered
+
 bool is_rectified(const RecordedImages& images) { return has_any(images.topic.name, {"_rect"}); }
 
 // How well images serve as colour or as depth; 0: not at all.
@@ -44,7 +46,7 @@ int score_as_depth(const RecordedImages& images) {
   if (!is_named && (images.encoding == "mono16" || has_any(name, {"infra", "confidence"}))) return 0;
   const int raw = images.is_compressed ? 0 : 1;
   if (has_any(name, {"aligned_depth", "depth_to_color", "depth_to_rgb"})) return 40 + raw;
-  if (has_any(name, {"registered"})) return 30 + raw;
+  if (has_any(name, {"registered"})) return kRegistered + raw;
   return (is_named ? 20 : 10) + raw;
 }
 
@@ -113,34 +115,37 @@ bool is_same(const Camera& a, const Camera& b) {
   constexpr double kPixels = 0.5;
   return a.width == b.width && a.height == b.height && std::abs(a.fx - b.fx) < kPixels &&
          std::abs(a.fy - b.fy) < kPixels && std::abs(a.cx - b.cx) < kPixels &&
-         std::abs(a.cy - b.cy) < kPixels;
+         std::abs(a.cy - b.cy) < kPixels && a.model == b.model && a.distortion == b.distortion;
 }
 
-// Whether depth is in the image of colour, by the calibrations that the recording has.
+// Whether depth is in the image of colour, by the calibrations that the recording has: the user may have a
+// better one of colour.
 void register_depth(RecordingStreams& streams, const RecordingContents& contents, const std::string& file) {
   const RecordedImages& depth = streams.depth;
-  const bool says_so = score_as_depth(depth) >= 30;
+  const bool says_so = score_as_depth(depth) >= kRegistered;
+  const cv::Size size(streams.camera.width, streams.camera.height);
   streams.depth_camera = streams.camera;
   if (!depth.info) {
-    if (!depth.size.empty() && depth.size != cv::Size(streams.camera.width, streams.camera.height))
+    if (!depth.size.empty() && depth.size != size)
       throw InputError(
           file + ": depth images of " + depth.topic.name +
-          " are of another size than colour, and the file has no camera_info of them; record it, or depth "
-          "that is registered to colour (aligned_depth_to_color)");
+          " are of another size than colour, and the file has no camera_info of them; record it, "
+          "or depth that is registered to colour (aligned_depth_to_color)");
     if (!says_so) ++streams.notes[depth.topic.name + " has no camera_info; taken as registered to colour"];
     return;
   }
-  streams.depth_camera = camera_of(depth, file, "another --depth");
-  const bool is_one_frame = depth.frame == streams.colour.frame;
-  if (is_same(streams.depth_camera, streams.camera) && (is_one_frame || says_so || depth.frame.empty()))
-    return;
+  const Camera depth_camera = camera_of(depth, file, "another --depth");
+  const bool is_one_frame = depth.frame == streams.colour.frame || depth.frame.empty();
+  if (says_so && cv::Size(depth_camera.width, depth_camera.height) == size) return;
+  const Camera colour = streams.colour.info ? camera_of(streams.colour, file, "--camera") : streams.camera;
+  if (is_one_frame && is_same(depth_camera, colour)) return;
+  streams.depth_camera = depth_camera;
   streams.T_colour_depth = contents.frames.transform(streams.colour.frame, depth.frame);
   if (!streams.T_colour_depth)
-    throw InputError(
-        file + ": depth images of " + depth.topic.name + " are of another camera (frame '" + depth.frame +
-        "') than colour (frame '" + streams.colour.frame +
-        "'), and the file does not say how the two are placed; record /tf_static with them, or depth that "
-        "is registered to colour (aligned_depth_to_color)");
+    throw InputError(file + ": depth images of " + depth.topic.name + " are of another camera (frame '" +
+                     depth.frame + "') than colour (frame '" + streams.colour.frame +
+                     "'), and the file does not say how the two are placed; record /tf_static with them, or "
+                     "depth that is registered to colour (aligned_depth_to_color)");
 }
 
 void choose_inertial(RecordingStreams& streams, const RecordingContents& contents,
@@ -160,7 +165,9 @@ void choose_inertial(RecordingStreams& streams, const RecordingContents& content
   } else if (both.empty() && accelerometers.size() == 1 && gyroscopes.size() == 1) {
     streams.inertial = {accelerometers.front(), gyroscopes.front()};
   } else if (!contents.inertial.empty()) {
-    ++streams.notes["several topics of inertial samples, of which none is used; choose one with --imu"];
+    ++streams.notes[contents.inertial.size() > 1
+                        ? "several topics of inertial samples, of which none is used; choose one with --imu"
+                        : "inertial samples without a gyroscope or an accelerometer are not used"];
   }
   if (streams.inertial.empty() || streams.camera.imu) return;
   const auto frame = contents.inertial_frames.find(streams.inertial.back().id);
@@ -216,9 +223,10 @@ RecordingStreams choose_streams(const RecordingContents& contents, const Recordi
                      "' and depth images by '" + streams.depth.clock +
                      "', so that they cannot be paired; record both with global time enabled");
   streams.frames = contents.frames;
+  streams.notes = contents.faults;
   streams.camera = camera ? *camera : camera_of(streams.colour, file, "--camera");
   if (!camera && streams.colour.rate() > 0.0) streams.camera.fps = streams.colour.rate();
-  if (!(streams.camera.depth_units_per_metre > 0.0) && streams.depth.encoding != "32FC1") {
+  if (!(streams.camera.depth_units_per_metre > 0.0) && !streams.depth.encoding.starts_with("32FC1")) {
     constexpr double kMillimetres = 1000.0;  // as ROS defines 16UC1
     streams.camera.depth_units_per_metre = streams.depth.units_per_metre.value_or(kMillimetres);
   }

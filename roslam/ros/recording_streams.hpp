@@ -22,7 +22,7 @@ struct RecordingChoice {
 /// What of a recording makes frames.
 struct RecordingStreams {
   RecordedImages colour, depth;
-  Camera camera;  ///< of colour; depth_units_per_metre is 0 where depth is in metres
+  Camera camera;  ///< of colour; depth_units_per_metre is that of 16-bit depth; 0 where depth is in metres
   Camera depth_camera;
   std::optional<SE3> T_colour_depth;    ///< where depth has to be registered to colour
   std::vector<RecordedTopic> inertial;  ///< one, or an accelerometer and a gyroscope

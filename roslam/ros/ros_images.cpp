@@ -57,13 +57,20 @@ bool is_compressed_depth(const RosImage& image) {
   return image.is_compressed && image.encoding.find("compressedDepth") != std::string::npos;
 }
 
-// The pixels, in the memory of the message.
+// The pixels, in the memory of the message where that is possible.
 cv::Mat raw_pixels(const RosImage& image, const Encoding& encoding) {
   const std::size_t row =
       static_cast<std::size_t>(image.width) * static_cast<std::size_t>(CV_ELEM_SIZE(encoding.type));
   if (image.step < row) throw InputError("image whose rows are shorter than its width");
+  if (image.step % CV_ELEM_SIZE1(encoding.type) != 0) throw InputError("image whose rows end within a pixel");
   auto* data = const_cast<std::uint8_t*>(image.data.data());  // of cv::Mat; not written to
-  return cv::Mat(image.height, image.width, encoding.type, data, image.step);
+  const cv::Mat bytes(image.height, static_cast<int>(row), CV_8UC1, data, image.step);
+  if (CV_ELEM_SIZE1(encoding.type) == 1)
+    return cv::Mat(image.height, image.width, encoding.type, data, image.step);
+  // Wider numbers need not be aligned in a message.
+  cv::Mat aligned(image.height, image.width, encoding.type);
+  for (int y = 0; y < image.height; ++y) std::memcpy(aligned.ptr(y), bytes.ptr(y), row);
+  return aligned;
 }
 
 cv::Mat decoded(std::span<const std::uint8_t> bytes, int flags) {
@@ -104,7 +111,8 @@ cv::Mat compressed_depth(const RosImage& image, double units_per_metre, std::siz
 }
 
 [[noreturn]] void refuse(const RosImage& image, const char* what) {
-  throw InputError("image of the encoding '" + image.encoding + "' is not " + what);
+  constexpr std::size_t kLongest = 64;  // of a name
+  throw InputError("image of the encoding '" + image.encoding.substr(0, kLongest) + "' is not " + what);
 }
 }  // namespace
 

@@ -30,15 +30,14 @@ Eigen::Vector3d vector_of(RosReader& reader) {
   return {x, y, z};
 }
 
-// Translation, then the quaternion x y z w.
-SE3 pose_of(RosReader& reader) {
+// Translation, then the quaternion x y z w; nothing if it is no pose.
+std::optional<SE3> pose_of(RosReader& reader) {
   const Eigen::Vector3d translation = vector_of(reader);
   const Eigen::Vector3d imaginary = vector_of(reader);
   const Eigen::Quaterniond rotation(reader.get<double>(), imaginary.x(), imaginary.y(), imaginary.z());
   constexpr double kRounding = 1e-2;
-  if (!translation.allFinite() || !(std::abs(rotation.norm() - 1.0) < kRounding))
-    throw InputError("pose that is not finite or has no unit quaternion");
-  return {rotation.normalized(), translation};
+  if (!translation.allFinite() || !(std::abs(rotation.norm() - 1.0) < kRounding)) return std::nullopt;
+  return SE3(rotation.normalized(), translation);
 }
 
 // Models as ROS and the RealSense SDK name them. The SDK's own projection applies the inverse of Brown's
@@ -140,7 +139,10 @@ std::optional<std::vector<RosTransform>> decode_transforms(std::string_view type
     RosTransform transform;
     transform.header = header_of(reader);
     if (!is_pose) transform.child = reader.text();
-    transform.T_parent_child = pose_of(reader);
+    const auto pose = pose_of(reader);
+    if (!pose && is_tf) continue;  // of many, such as of a node that has not begun yet
+    if (!pose) throw InputError("pose that is not finite or has no unit quaternion");
+    transform.T_parent_child = *pose;
     result.push_back(std::move(transform));
   }
   return result;

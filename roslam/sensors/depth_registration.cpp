@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "roslam/common/error.hpp"
@@ -14,7 +15,7 @@ constexpr float kNearest = 1e-3F;  // metres before the colour camera
 constexpr float kFarthest = 1e4F;  // metres
 constexpr float kUnknown = 1e9F;   // depth of a pixel while nothing is drawn there
 constexpr float kFar = 1e6F;       // pixels; what is farther outside is not in the image
-constexpr int kLargest = 64;       // pixels that one may cover in each direction
+constexpr int kLargest = 64;       // pixels that one may cover in each direction; more is no measurement
 constexpr int kMargin = 32;        // pixels around the image for which distortion is known
 
 // The smallest integer that is not less. Written so that a loop over it is vectorised. The limits below have
@@ -37,9 +38,9 @@ void draw(const cv::Rect& area, float z, cv::Mat& image) {
     set(below[last]);
     return;
   }
-  for (int y = area.y; y < area.y + std::min(area.height, kLargest); ++y) {
+  for (int y = area.y; y < area.y + area.height; ++y) {
     float* at = image.ptr<float>(y) + area.x;
-    for (int x = 0; x < std::min(area.width, kLargest); ++x) set(at[x]);
+    for (int x = 0; x < area.width; ++x) set(at[x]);
   }
 }
 }  // namespace
@@ -87,8 +88,9 @@ DepthRegistration::DepthRegistration(const Camera& depth, const Camera& colour, 
       y_.push_back(ray.y());
       z_.push_back(ray.z());
       if (u == depth.width || v == depth.height) continue;
-      const Eigen::Vector2d centre(u, v);
-      centre_z_.push_back(static_cast<float>(R.row(2).dot(depth.unproject(depth.undistort(centre), 1.0))));
+      const auto centre = depth.try_undistort({u, v});
+      centre_z_.push_back(centre ? static_cast<float>(R.row(2).dot(depth.unproject(*centre, 1.0)))
+                                 : std::numeric_limits<float>::quiet_NaN());  // not seen by the lens
     }
   }
   measure_seams();
@@ -180,12 +182,11 @@ cv::Mat DepthRegistration::operator()(const cv::Mat& depth) const {
     for (std::size_t u = 0; u < row.z.size(); ++u) {
       if (!(row.z[u] > kNearest && row.z[u] < kFarthest)) continue;
       // The order of the corners changes where one camera is turned against the other.
-      const int left = std::max(std::min(row.left[u], row.right[u]), 0);
-      const int right = std::min(std::max(row.left[u], row.right[u]), to_.width);
-      const int top = std::max(std::min(row.top[u], row.bottom[u]), 0);
-      const int bottom = std::min(std::max(row.top[u], row.bottom[u]), to_.height);
-      if (left < right && top < bottom)
-        draw(cv::Rect(left, top, right - left, bottom - top), row.z[u], result);
+      const auto [left, right] = std::minmax(row.left[u], row.right[u]);
+      const auto [top, bottom] = std::minmax(row.top[u], row.bottom[u]);
+      if (right - left > kLargest || bottom - top > kLargest) continue;  // a corner is beyond the lens
+      const cv::Rect area = cv::Rect(left, top, right - left, bottom - top) & cv::Rect({0, 0}, to_);
+      if (!area.empty()) draw(area, row.z[u], result);
     }
   }
   for (int y = 0; y < result.rows; ++y) {

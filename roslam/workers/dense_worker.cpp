@@ -295,13 +295,13 @@ std::optional<DenseMap> DenseWorker::Impl::map_of(SubmapId submap,
     for (const auto& point : removed_.at(id))
       map.removed.push_back({world_from_camera * point.position, Eigen::Vector3f::Zero(), point.colour});
   }
-  if (!should_stop()) add_occupancy(submap, map);
   return map;
 }
 
 std::optional<DenseMap> DenseWorker::result(SubmapId submap, const std::stop_token& stop) const {
   auto map = impl_->map_of(submap, [&] { return stop.stop_requested(); });
   if (!map) return std::nullopt;
+  if (!stop.stop_requested()) impl_->add_occupancy(submap, *map);
   map->dropped = impl_->jobs_.dropped();
   for (const auto& [fault, count] : impl_->jobs_.faults()) map->faults[fault] += count;
   for (const auto& [fault, count] : impl_->worker_.faults()) map->faults[fault] += count;

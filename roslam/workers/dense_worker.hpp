@@ -63,7 +63,8 @@ class DenseWorker {
   std::shared_ptr<const OccupancyGrid> occupancy();
 
   /// The map that the call before asked for, made when the next keyframe was fused, and asks for one of this
-  /// submap; null if it is not made yet or none was asked for. May be called from any thread.
+  /// submap; null if it is not made yet or none was asked for. Without occupancy. May be called from any
+  /// thread.
   std::shared_ptr<const DenseMap> checkpoint(SubmapId submap);
 
   /// The map as it is. Only after drain(). Nothing if a stop was requested before it was extracted.

@@ -75,6 +75,7 @@ void resume(RunArguments& arguments) {
 }
 
 void execute(RunArguments arguments, const std::string& version) {
+  settle_imu(arguments.flight.source);
   resume(arguments);
   const Options options = options_of(arguments.flight);
   if (arguments.print_config) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "roslam/common/error.hpp"
 #include "roslam/datasets/dataset.hpp"
@@ -51,10 +52,11 @@ CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
       "Folder of a dataset (TUM RGB-D, 7-Scenes, ScanNet, ICL-NUIM, "
       "OpenLORIS), recording (ROS 1 bag, rosbag2 file or folder, MCAP), or simulated:street, simulated:loop, "
       "simulated:hover, simulated:turn, simulated:corridor");
-  command.add_option("--camera", arguments.camera,
-                     "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 bonn 7scenes d435 d455 simulated) "
-                     "or a YAML file; not "
-                     "needed where the source knows it");
+  command.add_option(
+      "--camera", arguments.camera,
+      "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 bonn 7scenes d435 d455 simulated) "
+      "or a YAML file; not "
+      "needed where the source knows it");
   return source;
 }
 
@@ -122,6 +124,19 @@ void add_flight_options(CLI::App& command, SourceArguments& arguments) {
       ->expected(0, 1);
   command.add_option("--gain", arguments.gain, "Factor of the image brightness of a simulated flight")
       ->capture_default_str();
+}
+
+void settle_imu(SourceArguments& arguments) {
+  if (!arguments.name.empty() || arguments.topics.inertial.empty()) return;
+  arguments.name = std::exchange(arguments.topics.inertial, {});
+  arguments.imu = true;
+}
+
+bool is_recorded(const std::string& name) { return !TumSource::recognises(name) && is_recording(name); }
+
+bool is_other_dataset(const std::string& name) {
+  const auto format = dataset_format(name);
+  return format && !(*format == DatasetFormat::kTum && TumSource::recognises(name));
 }
 
 std::optional<SimulatorOptions> simulated_flight(const SourceArguments& arguments) {
@@ -213,12 +228,6 @@ std::unique_ptr<FrameSource> open_recorded(const SourceArguments& arguments) {
   return std::make_unique<RecordingSource>(arguments.name, arguments.topics, camera, mount);
 }
 
-// A folder in another format than TUM RGB-D with its lists.
-bool is_other_dataset(const std::string& name) {
-  const auto format = dataset_format(name);
-  return format && !(*format == DatasetFormat::kTum && TumSource::recognises(name));
-}
-
 std::unique_ptr<FrameSource> open_other_dataset(const SourceArguments& arguments) {
   refuse_frames(arguments);
   std::optional<Camera> camera;
@@ -233,7 +242,7 @@ std::unique_ptr<FrameSource> open_other_dataset(const SourceArguments& arguments
 }  // namespace
 
 std::unique_ptr<TumSource> open_folder(const SourceArguments& arguments) {
-  if (is_recording(arguments.name))
+  if (is_recorded(arguments.name))
     throw InputError(arguments.name + ": is a recording, and this needs a folder in the TUM RGB-D format");
   if (is_other_dataset(arguments.name))
     throw InputError(arguments.name + ": is in the format of " +
@@ -250,9 +259,14 @@ std::unique_ptr<TumSource> open_folder(const SourceArguments& arguments) {
 
 std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
   std::unique_ptr<FrameSource> source;
+  for_each_topic(arguments, [&](const char* /*name*/, const std::string& topic) {
+    if (!topic.empty() && !is_recorded(arguments.name))
+      throw InputError(topic + ": is a topic of a recording, and " + arguments.name +
+                       " is none; leave it out");
+  });
   if (const auto flight = simulated_flight(arguments)) {
     source = std::make_unique<SimulatedSource>(*flight);
-  } else if (is_recording(arguments.name)) {
+  } else if (is_recorded(arguments.name)) {
     source = open_recorded(arguments);
   } else if (is_other_dataset(arguments.name)) {
     source = open_other_dataset(arguments);

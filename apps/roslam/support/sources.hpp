@@ -58,6 +58,17 @@ std::map<std::string, std::string> flight_in_words(const SourceArguments& argume
 /// The inverse; an option not in words keeps its default. Throws InputError for a value that is no number.
 SourceArguments flight_from_words(const std::string& name, const std::map<std::string, std::string>& words);
 
+/// Where no SOURCE was given before --imu, its value was meant as that. To be called before the arguments are
+/// used.
+void settle_imu(SourceArguments& arguments);
+
+/// True for a recording of a robot (ROS bag, rosbag2, MCAP). A folder of a dataset may hold such files as
+/// well.
+bool is_recorded(const std::string& name);
+
+/// True for a folder in another format than TUM RGB-D with its lists.
+bool is_other_dataset(const std::string& name);
+
 /// Kinds of sources; the flight is empty for others, and the folder must be in the TUM RGB-D format. All
 /// throw as open_source().
 std::optional<simulation::SimulatorOptions> simulated_flight(const SourceArguments& arguments);
