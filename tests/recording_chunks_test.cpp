@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <fstream>
 #include <random>
 
 #include "roslam/common/error.hpp"
@@ -220,6 +221,37 @@ void expect_bounded_memory(const fs::path& file, typename Writer::Options option
   EXPECT_EQ(count, kMessages);
   ASSERT_GT(before, 0u);
   EXPECT_LT(resident_kilobytes("VmHWM:"), before + 100 * 1024);
+}
+
+// The summary lists a chunk inside of the first record, whose size leads back to where it begins.
+TEST_F(RecordingChunks, ASummaryThatPointsIntoAnotherRecordEnds) {
+  McapOptions options("");
+  options.has_crcs = false;
+  McapWriter writer(file_, options);
+  writer.write(writer.add_topic("/a", "std_msgs/msg/String", ""), 1000, std::vector<std::uint8_t>(20, 7));
+  writer.close();
+  std::fstream bytes(file_, std::ios::in | std::ios::out | std::ios::binary);
+  const auto get = [&](std::uint64_t at) {
+    std::uint64_t value = 0;
+    bytes.seekg(static_cast<std::streamoff>(at));
+    bytes.read(reinterpret_cast<char*>(&value), sizeof(value));
+    return value;
+  };
+  const auto put = [&](std::uint64_t at, std::uint64_t value) {
+    bytes.seekp(static_cast<std::streamoff>(at));
+    bytes.write(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
+  const std::uint64_t size = fs::file_size(file_);
+  std::uint64_t at = get(size - 8 - 20);  // where the summary begins
+  while (at < size && (get(at) & 0xffU) != 8) at += 9 + get(at + 1);
+  ASSERT_LT(at, size) << "no index of a chunk";
+  put(at + 9 + 16, 13);          // where the chunk begins
+  put(9, 0 - std::uint64_t{9});  // size of the header
+  bytes.close();
+  const auto recording = open_recording(file_);
+  while (recording->next()) {
+  }
+  EXPECT_FALSE(recording->notes().empty());
 }
 
 TEST_F(RecordingChunks, MemoryDoesNotGrowWithTheFile) {
