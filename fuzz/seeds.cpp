@@ -13,6 +13,7 @@
 #include "roslam/options/options.hpp"
 #include "tests/onnx_writer.hpp"
 #include "tests/recording_writers.hpp"
+#include "tests/ros_writer.hpp"
 
 namespace {
 using namespace roslam;
@@ -126,6 +127,26 @@ void write_recordings(const std::filesystem::path& folder) {
   }
 }
 
+// One of each type, in both encodings; the first byte chooses (fuzz/ros_message.cpp).
+void put_messages(const std::filesystem::path& folder) {
+  make_folder(folder);
+  const auto put = [&](int choice, const ros::Bytes& message) {
+    std::string bytes(1, static_cast<char>(choice));
+    bytes.append(message.begin(), message.end());
+    write_file(folder / std::to_string(choice), bytes);
+  };
+  for (const ros::Version version : {ros::Version::kRos1, ros::Version::kRos2}) {
+    const int odd = version == ros::Version::kRos2 ? 1 : 0;
+    put(0 + odd, ros::tf(version, 1000, {{"a", "b", SE3()}, {"b", "c", SE3()}}));
+    put(2 + odd, ros::odometry(version, 1000, "a", "b", SE3()));
+    put(4 + odd, ros::pose_stamped(version, 1000, "a", SE3()));
+    put(8 + odd, ros::camera_info(version, 1000, "a", Camera{}));
+    put(10 + odd, ros::imu(version, 1000, "a", {0, 0, 1}, {0, 0, 9.8}));
+    put(12 + odd, ros::image(version, 1000, "a", "16UC1", cv::Mat(8, 8, CV_16UC1, cv::Scalar(1000))));
+    put(14 + odd, ros::compressed_image(version, 1000, "a", "16UC1; compressedDepth png", ros::Bytes(40, 1)));
+  }
+}
+
 // Camera files of other programs.
 void put_cameras(const std::filesystem::path& folder) {
   Camera camera = *camera_preset("tum-fr3");
@@ -178,6 +199,7 @@ int main(int count, char** arguments) {
     occupancy.write(folder / "occupancy" / "states.bt");
     occupancy.write(folder / "occupancy" / "probabilities.ot");
     write_recordings(folder);
+    put_messages(folder / "ros_message");
   } catch (const Error& error) {
     std::fprintf(stderr, "error: %s\n", error.what());
     return 1;
