@@ -118,7 +118,7 @@ std::optional<ByteBuffer> ChunkedRecording::unpack(const PackedChunk& chunk) {
     bytes.reset();
   }
   if (bytes && !is_truncated && chunk.crc != 0 && crc_of(bytes->span()) != chunk.crc) bytes.reset();
-  if (!bytes) note("damaged chunk, left out");
+  if (!bytes) note(kDamagedChunk);
   return bytes;
 }
 

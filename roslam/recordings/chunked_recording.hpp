@@ -16,6 +16,10 @@
 
 namespace roslam {
 
+// Notes on chunks that every format finds.
+constexpr const char* kDamagedChunk = "damaged chunk, left out";
+constexpr const char* kCutChunk = "cut or damaged record; the rest of its chunk was left out";
+
 /// A recording whose messages lie in chunks: merges them in the order of time. A chunk is loaded when its
 /// first time is reached and dropped after its last message, so that only chunks that overlap are in memory.
 /// What the formats have in common is here; a format finds the chunks when it opens the file, and lists their

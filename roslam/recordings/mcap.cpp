@@ -14,7 +14,6 @@ namespace {
 constexpr std::size_t kMaxChunkHeader = 256;
 constexpr std::size_t kMaxSchemaName = 1024;
 constexpr std::size_t kMaxSchemaBytes = std::size_t{64} << 20;
-constexpr const char* kDamagedChunk = "damaged chunk, left out";
 
 bool is_of_run(std::uint8_t operation) {
   return operation == kSchema || operation == kChannel || operation == kMessage;
@@ -159,7 +158,7 @@ std::vector<ChunkedRecording::Entry> McapFile::list(ByteSpan records) {
   while (cursor.left() > 0) {
     const auto record = take_record(cursor);
     if (!record) {
-      note("cut or damaged record; the rest of its chunk was left out");
+      note(kCutChunk);
       break;
     }
     if (is_opening() && record->operation == kSchema && !add_schema(record->content))

@@ -230,7 +230,7 @@ std::optional<ChunkedRecording::PackedChunk> RosBag::chunk_at(std::uint64_t offs
   const auto size = head ? number<std::uint32_t>(head->header, "size") : std::nullopt;
   const auto method = name ? compression_named(*name) : std::nullopt;
   if (!method || !size || head->operation != kChunk) {
-    note("damaged chunk, left out");
+    note(kDamagedChunk);
     return std::nullopt;
   }
   return PackedChunk{*method, head->data, head->data_size, *size, 0};
@@ -242,7 +242,7 @@ std::vector<ChunkedRecording::Entry> RosBag::list(ByteSpan records) {
   while (cursor.left() > 0) {
     const auto record = take_record(cursor);
     if (!record) {
-      note("cut or damaged record; the rest of its chunk was left out");
+      note(kCutChunk);
       break;
     }
     const auto operation = number<std::uint8_t>(record->header, "op");

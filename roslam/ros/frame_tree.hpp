@@ -9,6 +9,11 @@
 
 namespace roslam {
 
+/// The name of a frame without a leading slash, which old recordings have.
+inline std::string plain_frame(const std::string& name) {
+  return name.starts_with('/') ? name.substr(1) : name;
+}
+
 /// Coordinate frames by name, each placed in its parent, as ROS tells of them (tf).
 class FrameTree {
  public:

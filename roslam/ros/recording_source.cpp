@@ -2,24 +2,24 @@
 #include "roslam/ros/recording_source.hpp"
 
 #include <algorithm>
-#include <cctype>
-#include <cmath>
 #include <set>
 #include <utility>
 
 #include "roslam/common/error.hpp"
+#include "roslam/sensors/frame_images.hpp"
+#include "roslam/sensors/ground_truth.hpp"
 
 namespace roslam {
 
 namespace {
 constexpr std::size_t kMostWaiting = 60;  // images of a topic
+constexpr double kRestartSeconds = 1.0;   // as kClockRestart, of inertial samples and true poses
 constexpr std::int64_t kClockRestart =
     1'000'000'000;                                // nanoseconds back, from which a clock may have begun anew
 constexpr std::int64_t kOutlier = 5'000'000'000;  // that a clock may go on after a stamp that was none
 constexpr const char* kBack = "image whose time stamp is not after that of the one before";
 constexpr std::size_t kMostInertial = 4000;  // samples that may wait for an image
 constexpr std::size_t kMostPoses = 20000;
-constexpr double kMaxTruthGap = 0.2;  // seconds
 
 // The newest images, and what is a restart later, come last.
 template <typename Image>
@@ -27,18 +27,7 @@ std::pair<int, std::int64_t> order_of(const Image& image) {
   return {image.segment, image.stamp};
 }
 
-std::string size_in_words(const cv::Size& size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
-std::string plain_frame(const std::string& name) { return name.starts_with('/') ? name.substr(1) : name; }
-
-bool is_accelerometer(const RecordedTopic& topic) {
-  std::string name = topic.name;
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return name.find("accel") != std::string::npos;
-}
+std::int64_t distance(std::int64_t a, std::int64_t b) { return a < b ? b - a : a - b; }
 }  // namespace
 
 RecordingSource::RecordingSource(const std::filesystem::path& path, const RecordingChoice& choice,
@@ -149,8 +138,8 @@ void RecordingSource::put(const RecordedImages& images, std::span<const std::uin
 void RecordingSource::accept(Waiting image, Queue& queue, std::map<std::string, std::size_t>& skipped) {
   // A step back of about a second may be a restart to one of the streams only.
   const Queue& other = &queue == &colour_ ? depth_ : colour_;
-  const auto distance = other.last ? std::abs(image.stamp - *other.last) : kClockRestart;
-  if (queue.segment < other.segment && distance < kClockRestart) queue.segment = other.segment;
+  const bool is_near = other.last && distance(image.stamp, *other.last) < kClockRestart;
+  if (queue.segment < other.segment && is_near) queue.segment = other.segment;
   image.segment = queue.segment;
   queue.before = std::exchange(queue.last, image.stamp);
   queue.images.push_back(std::move(image));
@@ -165,7 +154,6 @@ std::optional<RecordingSource::Waiting> RecordingSource::take_depth(const Waitin
   while (!depths.empty() &&
          order_of(depths.front()) < std::pair(colour.segment, colour.stamp - half_interval_))
     depths.pop_front();
-  const auto distance = [](std::int64_t a, std::int64_t b) { return a < b ? b - a : a - b; };
   const auto is_near = [&](const Waiting& depth) {
     return depth.segment == colour.segment && distance(depth.stamp, colour.stamp) <= half_interval_;
   };
@@ -210,7 +198,7 @@ std::optional<Frame> RecordingSource::frame_of(const Waiting& colour, const std:
   } else {
     ++skipped_depth_["no depth image near in time"];
   }
-  take_inertial(frame, colour.stamp);
+  take_inertial(frame);
   frame.T_world_camera = truth_at(frame.timestamp);
   return frame;
 }
@@ -237,23 +225,20 @@ cv::Mat RecordingSource::depth_image(const Waiting& depth) {
 // A gyroscope of its own, whose samples come more often, is given the last acceleration.
 void RecordingSource::add_inertial(const RecordedTopic& topic, std::span<const std::uint8_t> message) {
   const RosImu imu = decode_imu(message, encoding_of(topic));
-  constexpr double kRestart = 1.0;  // seconds
-  if (!inertial_.empty() && seconds_of(imu.header.stamp) < inertial_.back().timestamp - kRestart)
-    inertial_.clear();
+  const double time = seconds_of(imu.header.stamp);
+  if (!inertial_.empty() && time < inertial_.back().timestamp - kRestartSeconds) inertial_.clear();
   const bool is_pair = streams_.inertial.size() > 1;
-  if (is_pair && is_accelerometer(topic)) {
+  if (is_pair && topic.id == streams_.inertial.front().id) {  // the accelerometer
     acceleration_ = imu.acceleration;
     return;
   }
   if (is_pair && !acceleration_) return;
-  inertial_.push_back(
-      {seconds_of(imu.header.stamp), imu.turn_rate, is_pair ? *acceleration_ : imu.acceleration});
+  inertial_.push_back({time, imu.turn_rate, is_pair ? *acceleration_ : imu.acceleration});
   if (inertial_.size() > kMostInertial) inertial_.pop_front();
 }
 
-void RecordingSource::take_inertial(Frame& frame, std::int64_t stamp) {
-  const double time = seconds_of(stamp);
-  while (!inertial_.empty() && inertial_.front().timestamp <= time) {
+void RecordingSource::take_inertial(Frame& frame) {
+  while (!inertial_.empty() && inertial_.front().timestamp <= frame.timestamp) {
     frame.inertial.push_back(inertial_.front());
     inertial_.pop_front();
   }
@@ -266,8 +251,7 @@ void RecordingSource::add_truth(std::span<const std::uint8_t> message) {
     if (!streams_.truth_child.empty() && plain_frame(transform.child) != plain_frame(streams_.truth_child))
       continue;
     const double time = seconds_of(transform.header.stamp);
-    constexpr double kRestart = 1.0;  // seconds
-    if (!truth_.empty() && time < truth_.back().timestamp - kRestart) truth_.clear();
+    if (!truth_.empty() && time < truth_.back().timestamp - kRestartSeconds) truth_.clear();
     if (!truth_.empty() && time <= truth_.back().timestamp) continue;
     truth_.push_back({time, transform.T_parent_child * place_camera(transform.child)});
     if (truth_.size() > kMostPoses) truth_.pop_front();
@@ -289,17 +273,16 @@ std::optional<SE3> RecordingSource::truth_at(double timestamp) {
   while (truth_.size() > 1 && truth_[1].timestamp <= timestamp) truth_.pop_front();
   const auto around = std::min<std::size_t>(truth_.size(), 2);
   const Trajectory poses(truth_.begin(), truth_.begin() + static_cast<std::ptrdiff_t>(around));
-  const auto pose = pose_at(poses, timestamp, kMaxTruthGap);
-  return pose ? std::optional(pose->T_world_camera) : std::nullopt;
+  return true_pose_at(poses, timestamp);
 }
 
 std::map<std::string, std::size_t> RecordingSource::notes() const {
   auto notes = notes_;
-  for (const auto* more : {&streams_.notes}) notes.insert(more->begin(), more->end());
-  for (const auto& [note, count] : recording_->notes()) notes[note] += count;
+  notes.insert(streams_.notes.begin(), streams_.notes.end());
+  for (const auto& [note, number] : recording_->notes()) notes[note] += number;
   if (streams_.truth && is_at_end_ && !T_child_camera_)
     ++notes["no ground truth was found in " + streams_.truth->name];
-  if (saturated_ > 0) notes["depth pixel at the end of the sensor's range, taken as unknown"] += saturated_;
+  count(notes, "depth pixel at the end of the sensor's range, taken as unknown", saturated_);
   return notes;
 }
 

@@ -68,7 +68,7 @@ class ROSLAM_EXPORT RecordingSource : public FrameSource {
   std::optional<Waiting> take_depth(const Waiting& colour);
   std::optional<Frame> frame_of(const Waiting& colour, const std::optional<Waiting>& depth);
   cv::Mat depth_image(const Waiting& depth);
-  void take_inertial(Frame& frame, std::int64_t stamp);
+  void take_inertial(Frame& frame);
   const SE3& place_camera(const std::string& child);
   std::optional<SE3> truth_at(double timestamp);
 

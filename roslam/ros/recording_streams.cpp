@@ -154,8 +154,10 @@ void choose_inertial(RecordingStreams& streams, const RecordingContents& content
   for (const RecordedTopic& topic : contents.inertial) {
     if (topic.name == choice.inertial) both = {topic};
     if (!choice.inertial.empty()) continue;
-    const std::string end = topic.name.substr(topic.name.find("/camera") == std::string::npos ? 0 : 1);
-    (has_any(end, {"accel"}) ? accelerometers : has_any(end, {"gyro"}) ? gyroscopes : both).push_back(topic);
+    (has_any(topic.name, {"accel"})  ? accelerometers
+     : has_any(topic.name, {"gyro"}) ? gyroscopes
+                                     : both)
+        .push_back(topic);
   }
   if (!choice.inertial.empty() && both.empty())
     throw InputError(file + ": --imu " + choice.inertial +

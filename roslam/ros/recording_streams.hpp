@@ -25,7 +25,7 @@ struct RecordingStreams {
   Camera camera;  ///< of colour; depth_units_per_metre is that of 16-bit depth; 0 where depth is in metres
   Camera depth_camera;
   std::optional<SE3> T_colour_depth;    ///< where depth has to be registered to colour
-  std::vector<RecordedTopic> inertial;  ///< one, or an accelerometer and a gyroscope
+  std::vector<RecordedTopic> inertial;  ///< one, or an accelerometer and then a gyroscope
   std::optional<RecordedTopic> truth;
   std::string truth_child;  ///< frame whose pose is taken of tf; empty: the one that messages name
   FrameTree frames;

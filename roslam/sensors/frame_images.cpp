@@ -7,12 +7,6 @@
 
 namespace roslam {
 
-namespace {
-std::string size_in_words(const cv::Size& size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-}  // namespace
-
 cv::Mat FrameImages::colour(const std::filesystem::path& file, const cv::Size& camera) {
   const ImageFile read = read_colour_image(file, bits_);
   if (!read.error.empty()) {

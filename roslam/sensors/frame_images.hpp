@@ -11,6 +11,11 @@
 
 namespace roslam {
 
+/// "640x480".
+inline std::string size_in_words(const cv::Size& size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
 /// Reads the images of a recording and counts by reason those that cannot be used.
 class ROSLAM_EXPORT FrameImages {
  public:

@@ -9,6 +9,7 @@
 #include "apps/roslam/support/progress.hpp"
 #include "recording/recorded_removal.hpp"
 #include "roslam/common/error.hpp"
+#include "roslam/sensors/frame_images.hpp"
 #include "roslam/sensors/image_file.hpp"
 
 namespace roslam::app {
@@ -20,10 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kOtherSource = "; give the SOURCE, --camera, --traffic and --seed it was made from";
-
-std::string size_in_words(const cv::Size& size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
 
 // Nothing if the mask was dropped or cannot be read.
 std::optional<RemovedThings> removal_of(const RecordedFrame& frame, const cv::Size& image) {
