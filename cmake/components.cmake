@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# Which parts are built: sets ROSLAM_HAS_SEMANTICS, ROSLAM_HAS_DENSE and ROSLAM_HAS_SIMULATION, and writes the version header.
+# Which parts are built: sets ROSLAM_HAS_SEMANTICS, _DENSE, _SIMULATION and _REALSENSE, and writes the version header.
 
 # roslam_component(NAME remedy condition...): whether ROSLAM_<NAME> is built.
 function(roslam_component name remedy)
@@ -26,6 +26,7 @@ endfunction()
 roslam_component(SEMANTICS nothing TRUE)
 roslam_component(DENSE liboctomap-dev octomap_FOUND)
 roslam_component(SIMULATION libembree-dev embree_FOUND)
+roslam_component(REALSENSE librealsense2-dev realsense2_FOUND)
 
 # Modules of OpenCV that are optional within the component semantics: ROSLAM_HAS_OPENCV_DNN and ROSLAM_HAS_OPENCV_PHOTO.
 foreach(module dnn photo)

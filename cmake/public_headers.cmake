@@ -19,9 +19,11 @@ set(ROSLAM_PUBLIC_HEADERS
   sensors/frame_images.hpp
   sensors/frame_source.hpp
   sensors/image_file.hpp
+  sensors/inertial_queue.hpp
   sensors/inertial_sample.hpp
+  sensors/stream_pairing.hpp
   sensors/timed_files.hpp
-  sensors/tum_source.hpp
+  datasets/tum_source.hpp
   ros/frame_tree.hpp
   recordings/recording.hpp
   ros/recording_contents.hpp
@@ -30,6 +32,9 @@ set(ROSLAM_PUBLIC_HEADERS
   ros/ros_images.hpp
   ros/ros_messages.hpp
   ros/ros_reader.hpp
+  cameras/depth_camera.hpp
+  cameras/exposure_settling.hpp
+  cameras/live_source.hpp
   datasets/dataset.hpp
   datasets/folder_source.hpp
   features/descriptor.hpp

@@ -11,7 +11,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/geometry/camera.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "roslam/slam/open_slam.hpp"
 #include "roslam/slam/run.hpp"
 

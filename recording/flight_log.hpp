@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "recording/appended_file.hpp"
+#include "roslam/common/appended_file.hpp"
 #include "roslam/slam/slam.hpp"
 
 namespace roslam::recording {

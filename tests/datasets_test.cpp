@@ -2,7 +2,7 @@
 // Folders of RGB-D datasets: written here from a plane seen along a path, and read again.
 #include <opencv2/imgproc.hpp>
 
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "tests/dataset_scene.hpp"
 
 namespace roslam {

@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 
 namespace roslam {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "roslam/dynamic_objects/dynamic_object_options.hpp"
 #include "roslam/geometry/trajectory.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "roslam/slam/slam.hpp"
 
 namespace roslam {

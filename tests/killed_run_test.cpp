@@ -11,7 +11,7 @@
 #include <sstream>
 #include <thread>
 
-#include "recording/appended_file.hpp"
+#include "roslam/common/appended_file.hpp"
 #include "recording/flight_log.hpp"
 #include "recording/odometry_file.hpp"
 #include "roslam/common/error.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Folders of RGB-D datasets whose images are listed: TUM RGB-D, ICL-NUIM, OpenLORIS.
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "tests/dataset_scene.hpp"
 
 namespace roslam {

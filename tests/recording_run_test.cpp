@@ -8,7 +8,7 @@
 
 #include "roslam/options/options.hpp"
 #include "roslam/ros/recording_source.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "roslam/slam/run.hpp"
 #include "tests/recording_writers.hpp"
 #include "tests/ros_writer.hpp"

@@ -8,7 +8,7 @@
 
 #include "evaluation/trajectory_error.hpp"
 #include "roslam/common/error.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "roslam/slam/run.hpp"
 #include "roslam/slam/slam.hpp"
 #include "simulation/simulated_source.hpp"

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "roslam/geometry/trajectory.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "tests/program.hpp"
 #include "tests/scratch.hpp"
 

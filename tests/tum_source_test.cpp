@@ -8,7 +8,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/sensors/image_file.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "tests/scratch.hpp"
 
 namespace roslam {

@@ -15,7 +15,7 @@
 #include "recording/output_folder.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/common/write_file.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "simulation/composition/composer.hpp"
 
 namespace roslam::app {

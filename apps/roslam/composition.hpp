@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "roslam/geometry/trajectory.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "simulation/composition/composer.hpp"
 
 namespace roslam::app {

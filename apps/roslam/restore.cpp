@@ -27,7 +27,7 @@
 #include "roslam/datasets/folder_source.hpp"
 #include "roslam/options/settings.hpp"
 #include "roslam/ros/recording_source.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "simulation/simulated_source.hpp"
 
 namespace roslam::app {

@@ -6,7 +6,7 @@
 #include "roslam/common/error.hpp"
 #include "roslam/datasets/formats.hpp"
 #include "roslam/datasets/text_numbers.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 
 namespace roslam {
 

@@ -11,7 +11,7 @@
 #include "roslam/datasets/inertial_lists.hpp"
 #include "roslam/datasets/text_numbers.hpp"
 #include "roslam/sensors/ground_truth.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 
 namespace roslam::datasets {
 

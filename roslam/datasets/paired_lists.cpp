@@ -10,7 +10,7 @@
 #include "roslam/common/error.hpp"
 #include "roslam/datasets/text_numbers.hpp"
 #include "roslam/sensors/image_file.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 
 namespace roslam::datasets {
 

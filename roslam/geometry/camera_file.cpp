@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <charconv>
 #include <set>
 
 #include "roslam/common/error.hpp"
 #include "roslam/geometry/camera_formats.hpp"
+#include "roslam/geometry/camera_import.hpp"
 
 namespace roslam {
 
@@ -80,9 +83,24 @@ double depth_units_of(const std::filesystem::path& path, const YAML::Node& node)
   return units;
 }
 
+// With all digits it needs to be read as the same number, and no more.
+std::string exact(double value) {
+  std::array<char, 32> text{};
+  const auto result = std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), result.ptr};
+}
+
+template <typename Numbers>
+std::vector<std::string> exact_all(const Numbers& values) {
+  std::vector<std::string> texts;
+  for (const double value : values) texts.push_back(exact(value));
+  return texts;
+}
+
 void write_transform(YAML::Emitter& out, const char* key, const SE3& transform) {
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> T = transform.matrix();
-  out << YAML::Key << key << YAML::Value << YAML::Flow << std::vector<double>(T.data(), T.data() + T.size());
+  out << YAML::Key << key << YAML::Value << YAML::Flow
+      << exact_all(std::vector<double>(T.data(), T.data() + T.size()));
 }
 
 ImuCalibration imu_of(const std::filesystem::path& path, const YAML::Node& node) {
@@ -106,8 +124,8 @@ ImuCalibration imu_of(const std::filesystem::path& path, const YAML::Node& node)
 void write(YAML::Emitter& out, const ImuCalibration& imu) {
   out << YAML::Key << "imu" << YAML::Value << YAML::BeginMap;
   write_transform(out, "T_camera_imu", imu.T_camera_imu);
-  out << YAML::Key << "gyroscope_noise" << YAML::Value << imu.gyroscope_noise;
-  out << YAML::Key << "gyroscope_walk" << YAML::Value << imu.gyroscope_walk;
+  out << YAML::Key << "gyroscope_noise" << YAML::Value << exact(imu.gyroscope_noise);
+  out << YAML::Key << "gyroscope_walk" << YAML::Value << exact(imu.gyroscope_walk);
   out << YAML::EndMap;
 }
 }  // namespace
@@ -149,25 +167,34 @@ Camera read_own(const std::filesystem::path& file, const YAML::Node& node) {
   return camera;
 }
 
+Camera camera_from_yaml(const std::string& text, const std::string& name) {
+  YAML::Node node;
+  try {
+    node = YAML::Load(text);
+  } catch (const YAML::Exception&) {
+    throw InputError(name + ": is no YAML");
+  }
+  return read_own(name, node);
+}
+
 std::string camera_to_yaml(const Camera& camera) {
   YAML::Emitter out;
-  out.SetDoublePrecision(12);
   out << YAML::BeginMap;
   out << YAML::Key << "model" << YAML::Value << std::string(lens_model_name(camera.model));
   out << YAML::Key << "width" << YAML::Value << camera.width;
   out << YAML::Key << "height" << YAML::Value << camera.height;
-  out << YAML::Key << "fx" << YAML::Value << camera.fx;
-  out << YAML::Key << "fy" << YAML::Value << camera.fy;
-  out << YAML::Key << "cx" << YAML::Value << camera.cx;
-  out << YAML::Key << "cy" << YAML::Value << camera.cy;
-  out << YAML::Key << "distortion" << YAML::Value << YAML::Flow << camera.coefficients();
+  out << YAML::Key << "fx" << YAML::Value << exact(camera.fx);
+  out << YAML::Key << "fy" << YAML::Value << exact(camera.fy);
+  out << YAML::Key << "cx" << YAML::Value << exact(camera.cx);
+  out << YAML::Key << "cy" << YAML::Value << exact(camera.cy);
+  out << YAML::Key << "distortion" << YAML::Value << YAML::Flow << exact_all(camera.coefficients());
   out << YAML::Key << "depth_units_per_metre" << YAML::Value;
-  camera.depth_units_per_metre > 0.0 ? out << camera.depth_units_per_metre : out << kNoUnits;
-  out << YAML::Key << "fps" << YAML::Value << camera.fps;
+  out << (camera.depth_units_per_metre > 0.0 ? exact(camera.depth_units_per_metre) : kNoUnits);
+  out << YAML::Key << "fps" << YAML::Value << exact(camera.fps);
   if (camera.depth_noise) {
     out << YAML::Key << "depth_noise" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key
-        << "constant" << YAML::Value << camera.depth_noise->constant << YAML::Key << "growth" << YAML::Value
-        << camera.depth_noise->growth << YAML::EndMap;
+        << "constant" << YAML::Value << exact(camera.depth_noise->constant) << YAML::Key << "growth"
+        << YAML::Value << exact(camera.depth_noise->growth) << YAML::EndMap;
   }
   if (camera.imu) write(out, *camera.imu);
   if (camera.T_body_camera != forward_camera()) write_transform(out, "T_body_camera", camera.T_body_camera);

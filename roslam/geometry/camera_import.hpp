@@ -27,4 +27,8 @@ struct ROSLAM_EXPORT ImportedCamera {
 ROSLAM_EXPORT ImportedCamera import_camera(const std::string& preset_or_file,
                                            const std::optional<std::array<int, 2>>& image_size = {});
 
+/// Reads the text of a camera file of RO-SLAM, as camera_to_yaml() writes it. name: for messages. Throws as
+/// read_camera() does.
+ROSLAM_EXPORT Camera camera_from_yaml(const std::string& text, const std::string& name);
+
 }  // namespace roslam

@@ -15,11 +15,13 @@ constexpr std::size_t kHead = 1 + 8;  // operation and size of a record
 constexpr std::size_t kFooter = kHead + 8 + 8 + 4;
 
 enum Operation : std::uint8_t {
+  kHeader = 0x01,
   kFooterRecord = 0x02,
   kSchema = 0x03,
   kChannel = 0x04,
   kMessage = 0x05,
   kChunk = 0x06,
+  kMessageIndex = 0x07,
   kChunkIndex = 0x08,
   kStatistics = 0x0b,
   kDataEnd = 0x0f

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "roslam/geometry/camera_import.hpp"
 #include "roslam/ros/realsense_topics.hpp"
 
 namespace roslam {
@@ -81,17 +82,23 @@ class Survey {
     if (is_pose) contents_.poses.push_back(topic);
     const bool is_tf = type == "tf2_msgs/TFMessage" || type == "tf/tfMessage";
     if (is_tf) contents_.transforms.push_back(topic);
+    const bool is_camera = topic.name == kCameraTopic && type == "std_msgs/String";
     const bool tells =
-        is_image || is_tf || type == "sensor_msgs/CameraInfo" || type == "sensor_msgs/Imu" ||
+        is_image || is_camera || is_tf || type == "sensor_msgs/CameraInfo" || type == "sensor_msgs/Imu" ||
         (topic.name.starts_with("/device_") && topic.name.find("/sensor_") != std::string::npos);
     if (tells) wanted_.insert(topic.id);
-    if (type == "sensor_msgs/CameraInfo" || is_tf) awaited_.insert(topic.id);
+    if (type == "sensor_msgs/CameraInfo" || is_tf || is_camera) awaited_.insert(topic.id);
   }
 
   void note(const RecordedTopic& topic, std::span<const std::uint8_t> message) {
     awaited_.erase(topic.id);
     if (const auto images = images_.find(topic.id); images != images_.end())
       return note_image(contents_.images[images->second], message);
+    if (topic.name == kCameraTopic) {
+      RosReader reader(message, encoding_of(topic));
+      contents_.camera = camera_from_yaml(reader.text(), "its camera file");
+      return;
+    }
     const std::string type = plain_type(topic.type);
     if (type == "sensor_msgs/Imu") {
       auto& frame = contents_.inertial_frames[topic.id];

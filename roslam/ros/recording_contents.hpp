@@ -17,6 +17,10 @@
 
 namespace roslam {
 
+/// The topic (std_msgs/String) in which recordings of RO-SLAM hold the whole camera file of their colour
+/// images.
+constexpr const char* kCameraTopic = "/roslam/camera";
+
 /// A topic of images, with what the recording says about it.
 struct RecordedImages {
   RecordedTopic topic;
@@ -46,6 +50,7 @@ struct RecordingContents {
   std::vector<RecordedTopic> poses;            ///< that may be ground truth
   std::vector<RecordedTopic> transforms;       ///< of tf
   FrameTree frames;
+  std::optional<Camera> camera;               ///< of kCameraTopic
   std::map<std::string, std::size_t> faults;  ///< messages of other topics that cannot be read, by reason
   bool is_realsense = false;                  ///< written by the RealSense SDK
   bool is_whole = true;                       ///< false: what follows the part that was looked at may differ

@@ -15,6 +15,8 @@
 #include "roslam/ros/recording_streams.hpp"
 #include "roslam/sensors/depth_registration.hpp"
 #include "roslam/sensors/frame_source.hpp"
+#include "roslam/sensors/inertial_queue.hpp"
+#include "roslam/sensors/stream_pairing.hpp"
 
 namespace roslam {
 
@@ -34,41 +36,22 @@ class ROSLAM_EXPORT RecordingSource : public FrameSource {
   std::optional<Frame> next() override;
   const Camera& camera() const override { return streams_.camera; }
   std::optional<std::size_t> size() const override { return streams_.colour.topic.messages; }
-  std::map<std::string, std::size_t> skipped() const override { return skipped_; }
-  std::map<std::string, std::size_t> skipped_depth() const override { return skipped_depth_; }
+  std::map<std::string, std::size_t> skipped() const override;
+  std::map<std::string, std::size_t> skipped_depth() const override;
   std::map<std::string, std::size_t> notes() const override;
 
   /// What was chosen.
   const RecordingStreams& streams() const { return streams_; }
 
  private:
-  // An image that waits for its partner.
-  struct Waiting {
-    std::int64_t stamp = 0;  // nanoseconds
-    int segment = 0;
-    std::size_t index = 0;
-    std::vector<std::uint8_t> message;
-  };
-  // The images of a topic that wait, and where its clock is.
-  struct Queue {
-    std::deque<Waiting> images;
-    std::optional<std::int64_t> last, before;  // the newest stamp, and that of the image before
-    std::optional<Waiting> candidate;          // may be the first after a restart of the clock
-    int segment = 0;
-    std::size_t count = 0;
-  };
+  using Pairing = StreamPairing<std::vector<std::uint8_t>>;  // of messages
 
   bool read_message();
-  void put(const RecordedImages& images, std::span<const std::uint8_t> message, Queue& queue,
-           std::map<std::string, std::size_t>& skipped);
-  void accept(Waiting image, Queue& queue, std::map<std::string, std::size_t>& skipped);
+  std::int64_t stamp_of(const RecordedImages& images, std::span<const std::uint8_t> message) const;
   void add_inertial(const RecordedTopic& topic, std::span<const std::uint8_t> message);
   void add_truth(std::span<const std::uint8_t> message);
-  bool is_decided() const;
-  std::optional<Waiting> take_depth(const Waiting& colour);
-  std::optional<Frame> frame_of(const Waiting& colour, const std::optional<Waiting>& depth);
-  cv::Mat depth_image(const Waiting& depth);
-  void take_inertial(Frame& frame);
+  std::optional<Frame> frame_of(const Pairing::Pair& images);
+  cv::Mat depth_image(const Pairing::Image& depth);
   const SE3& place_camera(const std::string& child);
   std::optional<SE3> truth_at(double timestamp);
 
@@ -76,13 +59,11 @@ class ROSLAM_EXPORT RecordingSource : public FrameSource {
   RecordingStreams streams_;
   bool is_realsense_ = false;
   std::optional<DepthRegistration> registration_;
-  std::int64_t half_interval_ = 0;  // nanoseconds
+  Pairing pairing_;
   bool is_at_end_ = false;
-  Queue colour_, depth_;
-  std::deque<InertialSample> inertial_;
-  std::optional<Eigen::Vector3d> acceleration_;  // newest of an accelerometer of its own
-  std::deque<StampedPose> truth_;                // of the camera
-  std::optional<SE3> T_child_camera_;            // from the camera to the frame whose pose truth is
+  InertialQueue inertial_;
+  std::deque<StampedPose> truth_;      // of the camera
+  std::optional<SE3> T_child_camera_;  // from the camera to the frame whose pose truth is
   std::map<std::string, std::size_t> skipped_, skipped_depth_, notes_;
   std::size_t saturated_ = 0;  // pixels of depth
 };

@@ -226,8 +226,12 @@ RecordingStreams choose_streams(const RecordingContents& contents, const Recordi
                      "', so that they cannot be paired; record both with global time enabled");
   streams.frames = contents.frames;
   streams.notes = contents.faults;
-  streams.camera = camera ? *camera : camera_of(streams.colour, file, "--camera");
-  if (!camera && streams.colour.rate() > 0.0) streams.camera.fps = streams.colour.rate();
+  const bool has_file = contents.camera && contents.camera->width == streams.colour.size.width &&
+                        contents.camera->height == streams.colour.size.height;
+  streams.camera = camera     ? *camera
+                   : has_file ? *contents.camera
+                              : camera_of(streams.colour, file, "--camera");
+  if (!camera && !has_file && streams.colour.rate() > 0.0) streams.camera.fps = streams.colour.rate();
   if (!(streams.camera.depth_units_per_metre > 0.0) && !streams.depth.encoding.starts_with("32FC1")) {
     constexpr double kMillimetres = 1000.0;  // as ROS defines 16UC1
     streams.camera.depth_units_per_metre = streams.depth.units_per_metre.value_or(kMillimetres);

@@ -7,7 +7,7 @@
 
 #include "apps/roslam/support/image_source.hpp"
 #include "roslam/geometry/camera.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 
 namespace roslam::app {
 

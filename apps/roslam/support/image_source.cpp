@@ -12,7 +12,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/sensors/image_file.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 
 namespace roslam {
 

@@ -11,7 +11,7 @@
 
 #include "roslam/ros/recording_streams.hpp"
 #include "roslam/sensors/frame_source.hpp"
-#include "roslam/sensors/tum_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "simulation/simulated_options.hpp"
 
 namespace roslam::app {

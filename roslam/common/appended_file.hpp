@@ -6,11 +6,13 @@
 #include <string>
 #include <string_view>
 
-namespace roslam::recording {
+#include "roslam/common/export.hpp"
+
+namespace roslam {
 
 /// A text file that grows by whole lines and survives a program that is killed, a power cut and a full disk:
 /// what was appended is flushed to the disk, and of lines that do not fit nothing stays. Not thread safe.
-class AppendedFile {
+class ROSLAM_EXPORT AppendedFile {
  public:
   /// Makes the file with its first line, in place of an older one. Throws OutputError.
   AppendedFile(std::filesystem::path file, std::string_view header);
@@ -37,4 +39,4 @@ class AppendedFile {
   std::size_t size_ = 0;  // bytes that are surely there
 };
 
-}  // namespace roslam::recording
+}  // namespace roslam

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recording/appended_file.hpp"
+#include "roslam/common/appended_file.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -11,7 +11,7 @@
 #include "roslam/common/error.hpp"
 #include "roslam/common/write_file.hpp"
 
-namespace roslam::recording {
+namespace roslam {
 
 AppendedFile::AppendedFile(std::filesystem::path file, std::string_view header) : file_(std::move(file)) {
   write_file(file_, header);
@@ -57,4 +57,4 @@ void AppendedFile::replace(std::string_view content) {
   open();
 }
 
-}  // namespace roslam::recording
+}  // namespace roslam
