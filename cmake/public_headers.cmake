@@ -5,6 +5,7 @@ set(ROSLAM_PUBLIC_HEADERS
   common/export.hpp
   common/resources.hpp
   common/stage_times.hpp
+  common/timestamp.hpp
   geometry/alignment.hpp
   geometry/camera.hpp
   geometry/camera_export.hpp

@@ -10,8 +10,8 @@
 #include <thread>
 
 #include "roslam/common/error.hpp"
-#include "roslam/geometry/camera.hpp"
 #include "roslam/datasets/tum_source.hpp"
+#include "roslam/geometry/camera.hpp"
 #include "roslam/slam/open_slam.hpp"
 #include "roslam/slam/run.hpp"
 

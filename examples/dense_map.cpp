@@ -4,10 +4,10 @@
 #include <iostream>
 
 #include "roslam/common/error.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "roslam/dense/surface_file.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/occupancy/occupancy_map.hpp"
-#include "roslam/datasets/tum_source.hpp"
 #include "roslam/slam/open_slam.hpp"
 
 int main(int argc, char** argv) try {

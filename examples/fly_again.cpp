@@ -5,9 +5,9 @@
 #include <iostream>
 
 #include "roslam/common/error.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/map_io/map_file.hpp"
-#include "roslam/datasets/tum_source.hpp"
 #include "roslam/slam/open_slam.hpp"
 
 int main(int argc, char** argv) try {

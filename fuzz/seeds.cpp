@@ -109,14 +109,14 @@ void write_recordings(const std::filesystem::path& folder) {
     write_recording(cut);
   }
   for (const std::string method : {"none", "lz4", "zstd", "unchunked"}) {
-    McapOptions options(method);
+    TestMcapOptions options(method);
     options.chunk_bytes = 300;
     options.has_chunks = method != "unchunked";
     options.has_crcs = false;  // else a damaged chunk is never looked into
-    McapWriter closed(folder / "mcap" / method, options);
+    TestMcapWriter closed(folder / "mcap" / method, options);
     write_recording(closed);
     closed.close();
-    McapWriter cut(folder / "mcap" / (method + "_cut"), options);
+    TestMcapWriter cut(folder / "mcap" / (method + "_cut"), options);
     write_recording(cut);
   }
   for (const bool compresses : {false, true}) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "roslam/common/timestamp.hpp"
 #include "roslam/geometry/mount.hpp"
 #include "simulation/simulated_noise.hpp"
 
@@ -51,7 +52,7 @@ std::vector<InertialSample> inertial_samples(const Flight& flight, double after,
          T_world_imu(time + kSmooth).translation()) /
         (kSmooth * kSmooth);
     InertialSample sample;
-    sample.timestamp = time;
+    sample.timestamp = seconds_of(nanoseconds_of(time));
     sample.turn_rate = so3_log(turned.rotation()) * kRate + gyroscope_bias(time, seed) +
                        kGyroscopeNoise * std::sqrt(kRate) * noise(bits);
     sample.acceleration = here.rotation().inverse() * (acceleration + kGravity * Eigen::Vector3d::UnitZ()) +

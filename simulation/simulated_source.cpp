@@ -6,6 +6,7 @@
 #include <string>
 
 #include "roslam/common/error.hpp"
+#include "roslam/common/timestamp.hpp"
 #include "simulation/depth_noise.hpp"
 #include "simulation/simulated_city.hpp"
 #include "simulation/simulated_corridor.hpp"
@@ -105,7 +106,8 @@ SimulatedView Simulator::render(std::size_t index, SimulatedParts parts) {
   }
   SimulatedView view;
   view.frame.index = index;
-  view.frame.timestamp = static_cast<double>(index) / impl_->options.fps;
+  // In whole nanoseconds, as cameras and recordings give it.
+  view.frame.timestamp = seconds_of(nanoseconds_of(static_cast<double>(index) / impl_->options.fps));
   const SE3 pose = T_world_camera(index);
   if (impl_->options.imu) {
     const double since = view.frame.timestamp - 1.0 / impl_->options.fps;

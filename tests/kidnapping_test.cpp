@@ -6,9 +6,9 @@
 #include <memory>
 #include <ostream>
 
+#include "roslam/datasets/tum_source.hpp"
 #include "roslam/dynamic_objects/dynamic_object_options.hpp"
 #include "roslam/geometry/trajectory.hpp"
-#include "roslam/datasets/tum_source.hpp"
 #include "roslam/slam/slam.hpp"
 
 namespace roslam {

@@ -15,20 +15,20 @@
 
 namespace roslam {
 
-struct McapOptions : ChunkOptions {
-  McapOptions() = default;
-  explicit McapOptions(const std::string& method) { compression = method; }
+struct TestMcapOptions : ChunkOptions {
+  TestMcapOptions() = default;
+  explicit TestMcapOptions(const std::string& method) { compression = method; }
   bool has_chunks = true;   ///< else messages lie in the file itself
   bool has_summary = true;  ///< written by close()
   bool has_crcs = true;
 };
 
 /// An MCAP file, as rosbag2 writes it.
-class McapWriter : public RecordingWriter {
+class TestMcapWriter : public RecordingWriter {
  public:
-  using Options = McapOptions;
+  using Options = TestMcapOptions;
 
-  explicit McapWriter(const std::filesystem::path& file, Options options = {})
+  explicit TestMcapWriter(const std::filesystem::path& file, Options options = {})
       : out_(file, std::ios::binary), options_(std::move(options)) {
     out_ << kMagic << record(0x01, text("ros2") + text("test"));
   }

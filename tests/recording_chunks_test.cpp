@@ -66,7 +66,7 @@ TEST_F(RecordingChunks, OverlappingAndUnsortedChunksAreMerged) {
     write_chunks<BagWriter>(chunks, closes);
     EXPECT_EQ(times_and_numbers(), expected) << closes;
     number_ = 0;
-    write_chunks<McapWriter>(chunks, closes);
+    write_chunks<TestMcapWriter>(chunks, closes);
     EXPECT_EQ(times_and_numbers(), expected) << closes;
   }
 }
@@ -128,7 +128,7 @@ TEST_F(RecordingChunks, SeveralPublishersOfATopicAreOne) {
 
 TEST_F(RecordingChunks, ADamagedChunkIsLeftOutAndCounted) {
   for (const std::string method : {"none", "lz4", "zstd"}) {
-    McapWriter writer(file_, McapOptions(method));
+    TestMcapWriter writer(file_, TestMcapOptions(method));
     const int topic = writer.add_topic("/t", "std_msgs/msg/String", "");
     for (int i = 0; i < 3; ++i) {
       writer.write(topic, i, bytes_of("chunk " + std::to_string(i) + std::string(100, 'x')));
@@ -148,12 +148,12 @@ TEST_F(RecordingChunks, ADamagedChunkIsLeftOutAndCounted) {
 
 // Messages between chunks are not in the index of chunks.
 TEST_F(RecordingChunks, MessagesBesideTheChunksOfAnMcapFileAreFound) {
-  write_chunks<McapWriter>({{10, 30}, {20, 40}});
+  write_chunks<TestMcapWriter>({{10, 30}, {20, 40}});
   std::string bytes = bytes_of_file(file_);
   const std::string loose =
-      McapWriter::record(0x05, bits(std::uint16_t{0}) + bits(std::uint32_t{9}) + bits(std::uint64_t{25}) +
-                                   bits(std::uint64_t{25}) + "77");
-  const std::string data_end = McapWriter::record(0x0f, bits(std::uint32_t{0}));
+      TestMcapWriter::record(0x05, bits(std::uint16_t{0}) + bits(std::uint32_t{9}) + bits(std::uint64_t{25}) +
+                                       bits(std::uint64_t{25}) + "77");
+  const std::string data_end = TestMcapWriter::record(0x0f, bits(std::uint32_t{0}));
   // The summary moves, and its checksum is no longer known.
   const std::size_t at = bytes.find(data_end);
   const std::size_t footer = bytes.size() - 8 - 20;
@@ -225,9 +225,9 @@ void expect_bounded_memory(const fs::path& file, typename Writer::Options option
 
 // The summary lists a chunk inside of the first record, whose size leads back to where it begins.
 TEST_F(RecordingChunks, ASummaryThatPointsIntoAnotherRecordEnds) {
-  McapOptions options("");
+  TestMcapOptions options("");
   options.has_crcs = false;
-  McapWriter writer(file_, options);
+  TestMcapWriter writer(file_, options);
   writer.write(writer.add_topic("/a", "std_msgs/msg/String", ""), 1000, std::vector<std::uint8_t>(20, 7));
   writer.close();
   std::fstream bytes(file_, std::ios::in | std::ios::out | std::ios::binary);
@@ -257,10 +257,10 @@ TEST_F(RecordingChunks, ASummaryThatPointsIntoAnotherRecordEnds) {
 TEST_F(RecordingChunks, MemoryDoesNotGrowWithTheFile) {
   expect_bounded_memory<BagWriter>(file_, {"lz4"}, true);
   expect_bounded_memory<BagWriter>(file_, {"none"}, false);
-  McapOptions unchunked;
+  TestMcapOptions unchunked;
   unchunked.has_chunks = false;
-  expect_bounded_memory<McapWriter>(file_, McapOptions("zstd"), true);
-  expect_bounded_memory<McapWriter>(file_, unchunked, true);
+  expect_bounded_memory<TestMcapWriter>(file_, TestMcapOptions("zstd"), true);
+  expect_bounded_memory<TestMcapWriter>(file_, unchunked, true);
   expect_bounded_memory<Db3Writer>(file_, {.has_time_index = false}, true);
 }
 

@@ -6,9 +6,9 @@
 #include <functional>
 #include <opencv2/imgcodecs.hpp>
 
+#include "roslam/datasets/tum_source.hpp"
 #include "roslam/options/options.hpp"
 #include "roslam/ros/recording_source.hpp"
-#include "roslam/datasets/tum_source.hpp"
 #include "roslam/slam/run.hpp"
 #include "tests/recording_writers.hpp"
 #include "tests/ros_writer.hpp"
@@ -109,7 +109,9 @@ TEST(RecordingRun, IsBitIdenticalToThatOfTheFolder) {
     };
   };
   const auto mcap = [](const char* method) {
-    return [method](const fs::path& file) { return std::make_unique<McapWriter>(file, McapOptions(method)); };
+    return [method](const fs::path& file) {
+      return std::make_unique<TestMcapWriter>(file, TestMcapOptions(method));
+    };
   };
   const auto db3 = [](const fs::path& file) { return std::make_unique<Db3Writer>(file); };
   const std::vector<Case> cases{{"raw.bag", Version::kRos1, false, bag("lz4")},

@@ -48,21 +48,22 @@ std::vector<Format> formats() {
   }
   for (const std::string method : {"none", "lz4", "zstd"}) {
     for (const bool has_summary : {true, false}) {
-      McapOptions options(method);
+      TestMcapOptions options(method);
       options.chunk_bytes = 5000;
       options.has_summary = has_summary;
       options.has_crcs = method != "lz4";
       all.push_back(
           {"mcap_" + method + (has_summary ? "" : "_bare"), "sensor_msgs/msg/Image",
-           [options](const fs::path& file) { return std::make_unique<McapWriter>(file, options); }});
+           [options](const fs::path& file) { return std::make_unique<TestMcapWriter>(file, options); }});
     }
   }
   for (const bool has_summary : {true, false}) {
-    McapOptions options;
+    TestMcapOptions options;
     options.has_chunks = false;
     options.has_summary = has_summary;
-    all.push_back({has_summary ? "mcap_unchunked" : "mcap_unchunked_bare", "sensor_msgs/msg/Image",
-                   [options](const fs::path& file) { return std::make_unique<McapWriter>(file, options); }});
+    all.push_back(
+        {has_summary ? "mcap_unchunked" : "mcap_unchunked_bare", "sensor_msgs/msg/Image",
+         [options](const fs::path& file) { return std::make_unique<TestMcapWriter>(file, options); }});
   }
   for (const bool compresses : {true, false}) {
     const Db3Options options{compresses, !compresses, true};

@@ -79,9 +79,9 @@ TEST_F(Rosbag2, FilesOfAFolderAreReadOneAfterAnother) {
 }
 
 TEST_F(Rosbag2, MetadataSaysWhichFilesAndInWhichOrder) {
-  write<McapWriter>("b.mcap", {1, 2});
-  write<McapWriter>("a.mcap", {3, 4});
-  write<McapWriter>("stray.mcap", {9});
+  write<TestMcapWriter>("b.mcap", {1, 2});
+  write<TestMcapWriter>("a.mcap", {3, 4});
+  write<TestMcapWriter>("stray.mcap", {9});
   write_metadata({"folder/b.mcap", "a.mcap.zstd", "missing.mcap"});  // the second was unpacked by hand
   const auto recording = open_recording(folder_);
   EXPECT_EQ(times_of(*recording), (std::vector<int>{1, 2, 3, 4}));

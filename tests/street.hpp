@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "roslam/geometry/trajectory.hpp"
 #include "roslam/datasets/tum_source.hpp"
+#include "roslam/geometry/trajectory.hpp"
 #include "tests/program.hpp"
 #include "tests/scratch.hpp"
 

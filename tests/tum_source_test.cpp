@@ -7,8 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "roslam/common/error.hpp"
-#include "roslam/sensors/image_file.hpp"
 #include "roslam/datasets/tum_source.hpp"
+#include "roslam/sensors/image_file.hpp"
 #include "tests/scratch.hpp"
 
 namespace roslam {

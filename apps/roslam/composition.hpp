@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "roslam/geometry/trajectory.hpp"
 #include "roslam/datasets/tum_source.hpp"
+#include "roslam/geometry/trajectory.hpp"
 #include "simulation/composition/composer.hpp"
 
 namespace roslam::app {

@@ -25,9 +25,9 @@
 #include "roslam/common/write_file.hpp"
 #include "roslam/datasets/dataset.hpp"
 #include "roslam/datasets/folder_source.hpp"
+#include "roslam/datasets/tum_source.hpp"
 #include "roslam/options/settings.hpp"
 #include "roslam/ros/recording_source.hpp"
-#include "roslam/datasets/tum_source.hpp"
 #include "simulation/simulated_source.hpp"
 
 namespace roslam::app {

@@ -163,7 +163,8 @@ void CameraRecorder::put(std::vector<Message> messages) {
     return;
   }
   if (!last_time_ && !messages.empty())
-    for (Message& message : described(messages.front().time)) waiting_.push_back(std::move(message));
+    for (Message& message : described(next_time(messages.front().time)))
+      waiting_.push_back(std::move(message));
   for (Message& message : messages) {
     message.time = next_time(message.time);
     waiting_bytes_ += message.content.size();

@@ -265,7 +265,7 @@ std::optional<Frame> LiveSource::frame_of(Pairing::Pair images) {
   } else {
     ++skipped_depth_["no depth image near in time"];
   }
-  frame.inertial = inertial_.take_until(frame.timestamp);
+  frame.inertial = inertial_.take_until(frame.timestamp, frame.segment);
   return frame;
 }
 

@@ -55,6 +55,7 @@ class ROSLAM_EXPORT LiveSource : public FrameSource {
 
   /// Also throws InputError if no image comes at all, or colour and depth are stamped by different clocks.
   std::optional<Frame> next() override;
+  using FrameSource::next;
   void interrupt() override;
   bool is_live() const override { return true; }
   const Camera& camera() const override { return calibration_.colour; }

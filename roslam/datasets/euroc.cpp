@@ -10,8 +10,8 @@
 #include "roslam/datasets/formats.hpp"
 #include "roslam/datasets/inertial_lists.hpp"
 #include "roslam/datasets/text_numbers.hpp"
-#include "roslam/sensors/ground_truth.hpp"
 #include "roslam/datasets/tum_source.hpp"
+#include "roslam/sensors/ground_truth.hpp"
 
 namespace roslam::datasets {
 

@@ -9,8 +9,8 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/datasets/text_numbers.hpp"
-#include "roslam/sensors/image_file.hpp"
 #include "roslam/datasets/tum_source.hpp"
+#include "roslam/sensors/image_file.hpp"
 
 namespace roslam::datasets {
 

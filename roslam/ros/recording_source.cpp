@@ -125,7 +125,7 @@ std::optional<Frame> RecordingSource::frame_of(const Pairing::Pair& images) {
   } else {
     ++skipped_depth_["no depth image near in time"];
   }
-  frame.inertial = inertial_.take_until(frame.timestamp);
+  frame.inertial = inertial_.take_until(frame.timestamp, frame.segment);
   frame.T_world_camera = truth_at(frame.timestamp);
   return frame;
 }

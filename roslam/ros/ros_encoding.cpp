@@ -2,7 +2,6 @@
 #include "roslam/ros/ros_encoding.hpp"
 
 #include <array>
-#include <cmath>
 
 #include "roslam/common/error.hpp"
 #include "roslam/ros/ros_writer.hpp"
@@ -120,15 +119,6 @@ RosMessage encode_text(std::string_view text) {
   RosWriter writer;
   writer.text(text);
   return writer.take();
-}
-
-std::int64_t nanoseconds_of(double seconds) {
-  constexpr double kMost = 9.2e9;  // seconds
-  if (!(std::abs(seconds) < kMost))
-    throw InputError("a time stamp that cannot be: " + std::to_string(seconds));
-  // The whole seconds apart: a time since 1970 has more digits than the product could hold.
-  const double whole = std::floor(seconds);
-  return static_cast<std::int64_t>(whole) * 1'000'000'000 + std::llround((seconds - whole) * 1e9);
 }
 
 }  // namespace roslam

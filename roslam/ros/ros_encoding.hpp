@@ -44,7 +44,4 @@ ROSLAM_EXPORT RosMessage encode_text(std::string_view text);
 /// A position and a quaternion x y z w, the fields of most messages that hold a pose.
 ROSLAM_EXPORT void put_pose(RosWriter& writer, const SE3& pose);
 
-/// Seconds as nanoseconds, the nearest. Throws InputError for a time that does not fit (about 292 years).
-ROSLAM_EXPORT std::int64_t nanoseconds_of(double seconds);
-
 }  // namespace roslam

@@ -2,9 +2,7 @@
 #include "roslam/ros/ros_messages.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <cstdio>
 
 namespace roslam {
 
@@ -169,20 +167,6 @@ Camera camera_of(const RosCameraInfo& info, bool is_rectified) {
   if (!is_undistorted) set_lens(info, camera);
   camera.validate();
   return camera;
-}
-
-double seconds_of(std::int64_t nanoseconds) {
-  constexpr std::int64_t kSecond = 1000000000;
-  std::array<char, 48> text{};
-  const bool is_negative = nanoseconds < 0;
-  const std::uint64_t size =
-      is_negative ? 0 - static_cast<std::uint64_t>(nanoseconds) : static_cast<std::uint64_t>(nanoseconds);
-  const int length = std::snprintf(text.data(), text.size(), "%s%llu.%09llu", is_negative ? "-" : "",
-                                   static_cast<unsigned long long>(size / kSecond),
-                                   static_cast<unsigned long long>(size % kSecond));
-  double seconds = 0.0;
-  std::from_chars(text.data(), text.data() + length, seconds);
-  return seconds;
 }
 
 }  // namespace roslam

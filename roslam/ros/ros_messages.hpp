@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "roslam/common/timestamp.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "roslam/ros/ros_reader.hpp"
@@ -77,8 +78,5 @@ std::optional<std::vector<RosTransform>> decode_transforms(std::string_view type
 /// CalibrationError, without the name of the file, for a model of distortion that is not known, and if the
 /// calibration is not valid, such as all zeros.
 Camera camera_of(const RosCameraInfo& info, bool is_rectified = false);
-
-/// Nanoseconds as seconds, rounded as the decimal number in a text file would be.
-double seconds_of(std::int64_t nanoseconds);
 
 }  // namespace roslam

@@ -11,13 +11,13 @@ namespace roslam {
 
 /// Inertial samples that wait for the frame they belong to. Those of a gyroscope and an accelerometer that
 /// measure at times of their own are joined: each turn rate, which comes more often, with the newest
-/// acceleration. Bounded: of very many the oldest are lost. A clock that goes back by more than a second
-/// begins anew. Not thread safe.
+/// acceleration. Bounded: of very many the oldest are lost. Not thread safe.
 class InertialQueue {
  public:
   void add(const InertialSample& sample) {
-    if (!samples_.empty() && sample.timestamp < samples_.back().timestamp - kRestart) samples_.clear();
-    samples_.push_back(sample);
+    if (last_ && sample.timestamp < *last_ - kRestart) ++restarts_;
+    last_ = sample.timestamp;
+    samples_.push_back({sample, restarts_});
     if (samples_.size() > kMost) samples_.pop_front();
   }
 
@@ -28,22 +28,39 @@ class InertialQueue {
     if (acceleration_) add({timestamp, turn_rate, *acceleration_});
   }
 
-  /// Takes the samples until a time, in seconds.
-  std::vector<InertialSample> take_until(double timestamp) {
+  /// Takes the samples until the time of a frame, in seconds. segment: of the frame. Samples after a restart of
+  /// their clock are for the frames after the restart, though their times are earlier.
+  std::vector<InertialSample> take_until(double timestamp, int segment) {
+    if (segment != segment_) {
+      segment_ = segment;
+      while (!samples_.empty() && samples_.front().restarts < restarts_) samples_.pop_front();
+      taken_restarts_ = restarts_;
+    }
     std::vector<InertialSample> taken;
-    while (!samples_.empty() && samples_.front().timestamp <= timestamp) {
-      taken.push_back(samples_.front());
+    while (!samples_.empty()) {
+      const auto& [sample, restarts] = samples_.front();
+      const bool is_of_frame = restarts == taken_restarts_ || timestamp - sample.timestamp < kRestart;
+      if (sample.timestamp > timestamp || !is_of_frame) break;
+      taken.push_back(sample);
       samples_.pop_front();
     }
     return taken;
   }
 
  private:
-  static constexpr std::size_t kMost = 4000;
-  static constexpr double kRestart = 1.0;  // seconds
+  struct Waiting {
+    InertialSample sample;
+    int restarts;  // of its clock before it
+  };
 
-  std::deque<InertialSample> samples_;
+  static constexpr std::size_t kMost = 4000;
+  static constexpr double kRestart = 1.0;  // seconds that a clock goes back by
+
+  std::deque<Waiting> samples_;
   std::optional<Eigen::Vector3d> acceleration_;
+  std::optional<double> last_;
+  int restarts_ = 0, taken_restarts_ = 0;
+  int segment_ = 0;
 };
 
 }  // namespace roslam

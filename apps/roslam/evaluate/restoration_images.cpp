@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/roslam/support/image_source.hpp"
-#include "roslam/geometry/camera.hpp"
 #include "roslam/datasets/tum_source.hpp"
+#include "roslam/geometry/camera.hpp"
 
 namespace roslam::app {
 

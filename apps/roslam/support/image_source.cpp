@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "roslam/common/error.hpp"
-#include "roslam/sensors/image_file.hpp"
 #include "roslam/datasets/tum_source.hpp"
+#include "roslam/sensors/image_file.hpp"
 
 namespace roslam {
 

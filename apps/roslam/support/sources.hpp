@@ -9,9 +9,9 @@
 #include <optional>
 #include <string>
 
+#include "roslam/datasets/tum_source.hpp"
 #include "roslam/ros/recording_streams.hpp"
 #include "roslam/sensors/frame_source.hpp"
-#include "roslam/datasets/tum_source.hpp"
 #include "simulation/simulated_options.hpp"
 
 namespace roslam::app {
