@@ -103,7 +103,8 @@ TEST(CameraRecorder, ALiveCameraIsReadBackFrameByFrame) {
     if (!frame->depth.empty()) {
       EXPECT_EQ(cv::norm(frame->depth, expected.depth, cv::NORM_INF), 0.0);
     }
-    ASSERT_EQ(frame->inertial.size(), expected.inertial.size()) << expected.timestamp << " " << expected.index;
+    ASSERT_EQ(frame->inertial.size(), expected.inertial.size())
+        << expected.timestamp << " " << expected.index;
     for (std::size_t k = 0; k < frame->inertial.size(); ++k) {
       EXPECT_EQ(frame->inertial[k].timestamp, expected.inertial[k].timestamp);
       EXPECT_EQ(frame->inertial[k].turn_rate, expected.inertial[k].turn_rate);

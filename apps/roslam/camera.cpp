@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/live_camera.hpp"
 #include "apps/roslam/support/output.hpp"
 #include "apps/roslam/support/replaces_only.hpp"
 #include "roslam/common/error.hpp"
@@ -265,10 +266,12 @@ void add_convert_command(CLI::App& camera) {
 }  // namespace
 
 void add_camera_command(CLI::App& program) {
-  CLI::App* camera = program.add_subcommand("camera", "Show and convert camera files");
+  CLI::App* camera =
+      program.add_subcommand("camera", "Show and convert camera files, list connected cameras");
   camera->require_subcommand(1);
   add_show_command(*camera);
   add_convert_command(*camera);
+  add_camera_list_command(*camera);
 }
 
 }  // namespace roslam::app

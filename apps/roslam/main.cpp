@@ -40,6 +40,7 @@ void prepare_output() {
 
 void add_commands(CLI::App& program) {
   roslam::app::add_run_command(program, roslam::kVersion);
+  roslam::app::add_record_command(program);
   roslam::app::add_info_command(program);
   roslam::app::add_simulate_command(program);
   roslam::app::add_compose_command(program);

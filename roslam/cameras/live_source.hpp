@@ -43,8 +43,8 @@ struct ROSLAM_EXPORT LiveSourceOptions {
 /// next() and interrupt() may be called from two threads, the rest from that of next().
 class ROSLAM_EXPORT LiveSource : public FrameSource {
  public:
-  /// Opens the camera. T_body_camera: the mount. Throws InputError if there is no camera, or several and no serial
-  /// number, or it does not start.
+  /// Opens the camera. T_body_camera: the mount. Throws InputError if there is no camera, or several and no
+  /// serial number, or it does not start.
   LiveSource(std::unique_ptr<DepthCamera> camera, const LiveSourceOptions& options,
              const std::optional<SE3>& T_body_camera = {});
   ~LiveSource() override;

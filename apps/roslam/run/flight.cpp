@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "apps/roslam/support/live_camera.hpp"
 #include "apps/roslam/support/named_path.hpp"
 #include "apps/roslam/support/output.hpp"
 #include "apps/roslam/support/progress.hpp"
@@ -139,7 +140,10 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   Flight flight;
   flight.source = open_source(arguments.source);
   const Camera& camera = flight.source->camera();
-  const Mode mode = arguments.real_time ? Mode::kRealTime : Mode::kDeterministic;
+  const bool is_live = flight.source->is_live();
+  if (is_live && arguments.deterministic)
+    throw InputError(arguments.source.name + ": a camera does not wait; leave out --deterministic");
+  const Mode mode = arguments.real_time || is_live ? Mode::kRealTime : Mode::kDeterministic;
   const auto restorations = std::make_shared<Restorations>();
   flight.slam = open_slam(camera, options, mode, setup_of(arguments, restorations));
   const RunFolder folder(arguments.out, arguments.overwrite);
@@ -162,6 +166,8 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   FlightLog flight_log({folder.path(), arguments.checkpoint, flight.slam->options().keyframes.enabled,
                         arguments.checkpoint_dense},
                        *flight.slam);
+  std::optional<SourceRecorder> recorder;
+  if (!arguments.record.empty()) recorder.emplace(*flight.source, arguments.record);
   // A second signal may end the program before the trajectory is written anew.
   const std::stop_callback flush(stop, [&] { flight_log.flush(); });
   flight.summary = track(*flight.source, *flight.slam, flight_log, log, arguments.quiet, stop);
@@ -181,6 +187,10 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
     folder.write_flight(*flight.slam);
   } catch (...) {
     unwritten = std::current_exception();
+  }
+  if (recorder) {
+    attempt([&] { recorder->close(); });
+    flight.recorded = recorder->in_words();
   }
   if (log) attempt([&] { log->finish(); });
   attempt([&] { flight_log.finish(); });

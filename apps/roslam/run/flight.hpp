@@ -26,6 +26,7 @@ struct FlightArguments {
   bool resume = false;  ///< go on with the run in `out`, whose results so far are kept
   bool localise_only = false;
   std::string dynamic;            ///< empty: as the options say
+  std::string record;             ///< file to which a live camera is recorded; empty: none
   bool checkpoint_dense = false;  ///< save the dense map with each of them as well
   double checkpoint = 30.0;       ///< seconds between two saved maps; 0: none before the end
   bool video = false;
@@ -44,6 +45,7 @@ struct Flight {
   recording::RunResults summary;
   recording::RunDescription description;
   std::size_t restored = 0;  ///< keyframes
+  std::string recorded;      ///< in words, for --record
 };
 
 /// The options that the arguments ask for. Throws as read_options does.

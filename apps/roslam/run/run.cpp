@@ -11,7 +11,9 @@
 #include "apps/roslam/support/backend_option.hpp"
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/interrupt.hpp"
+#include "apps/roslam/support/live_camera.hpp"
 #include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/replaces_only.hpp"
 #include "roslam/common/error.hpp"
 
 namespace roslam::app {
@@ -45,6 +47,9 @@ void check(const FlightArguments& arguments, const Options& options) {
     throw CLI::ValidationError("--restore", "restores keyframes, and --localise-only creates none");
   if (arguments.restore && !options.dynamic_objects.is_on())
     throw CLI::ValidationError("--restore", "has nothing to restore with --dynamic none");
+  if (!arguments.record.empty() && !is_live_camera(arguments.source.name))
+    throw CLI::ValidationError("--record",
+                               "records a camera (realsense); roslam record converts other sources");
   if (!options.keyframes.enabled && arguments.map.empty()) {
     throw CLI::ValidationError("--localise-only", "needs --map, the map to localise in");
   }
@@ -102,11 +107,13 @@ void execute(RunArguments arguments, const std::string& version) {
 void add_run_command(CLI::App& program, const std::string& version) {
   const auto arguments = std::make_shared<RunArguments>();
   CLI::App* command = program.add_subcommand(
-      "run", "Track the camera of a recorded or simulated flight and map the static scene");
+      "run",
+      "Track a camera that is connected, or of a recorded or simulated flight, and map the static scene");
   command->footer(
       "Examples:\n"
       "  roslam run simulated:street --out street\n"
       "  roslam run rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy\n"
+      "  roslam run realsense --record flight.mcap --out flight\n"
       "  roslam run my_flight --camera my_camera.yaml --real-time --out live\n"
       "  roslam run another_flight --map live/map.roslam --out further\n"
       "Writes to the folder RUN of --out:\n"
@@ -129,6 +136,11 @@ void add_run_command(CLI::App& program, const std::string& version) {
       "but not\n"
       "every frame of the source has a pose, or the input is doubtful (a WARNING).");
   add_source_options(*command, arguments->flight.source);
+  add_stream_option(*command, arguments->flight.source);
+  command
+      ->add_option("--record", arguments->flight.record,
+                   "MCAP file to which the camera is recorded meanwhile; roslam run FILE repeats the flight")
+      ->check(ReplacesOnly({"\x89MCAP0\r\n"}));
   add_topic_options(*command, arguments->flight.source);
   add_mount_option(*command, arguments->flight.source);
   command->add_option("--out", arguments->flight.out,
@@ -139,9 +151,10 @@ void add_run_command(CLI::App& program, const std::string& version) {
       command->add_flag("--deterministic", arguments->flight.deterministic,
                         "Run the stages one after the other: the same input gives the same bytes (default)");
   command
-      ->add_flag(
-          "--real-time", arguments->flight.real_time,
-          "Run the stages in parallel, read frames at the pace of their timestamps, drop and count late ones")
+      ->add_flag("--real-time", arguments->flight.real_time,
+                 "Run the stages in parallel, read frames at the pace of their timestamps, drop and count "
+                 "late ones; "
+                 "always with a camera")
       ->excludes(deterministic);
   command
       ->add_option(

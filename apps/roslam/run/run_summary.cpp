@@ -97,6 +97,7 @@ void print_summary(const Flight& flight, const FlightArguments& arguments) {
     std::printf("latency: median %.1f ms, p95 %.1f ms, p99 %.1f ms from the image to its pose\n",
                 found->second.median_ms, found->second.p95_ms, found->second.p99_ms);
   }
+  if (!flight.recorded.empty()) std::printf("%s\n", flight.recorded.c_str());
   std::printf("results: %s\n", arguments.out.c_str());
 }
 

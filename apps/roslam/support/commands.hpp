@@ -15,6 +15,9 @@ class IncompleteRun : public std::runtime_error {
 
 // Each adds one subcommand. Its callback does the work and throws roslam::Error on bad input.
 void add_run_command(CLI::App& program, const std::string& version);
+/// `camera list`; camera: the command it belongs to.
+void add_camera_list_command(CLI::App& camera);
+void add_record_command(CLI::App& program);
 void add_info_command(CLI::App& program);
 void add_simulate_command(CLI::App& program);
 void add_compose_command(CLI::App& program);

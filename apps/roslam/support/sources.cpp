@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "apps/roslam/support/live_camera.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/datasets/dataset.hpp"
 #include "roslam/ros/recording_source.hpp"
@@ -50,8 +51,9 @@ CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
   CLI::Option* source = command.add_option(
       "SOURCE", arguments.name,
       "Folder of a dataset (TUM RGB-D, 7-Scenes, ScanNet, ICL-NUIM, "
-      "OpenLORIS), recording (ROS 1 bag, rosbag2 file or folder, MCAP), or simulated:street, simulated:loop, "
-      "simulated:hover, simulated:turn, simulated:corridor");
+      "OpenLORIS), recording (ROS 1 bag, rosbag2 file or folder, MCAP), camera (realsense, "
+      "realsense:SERIAL), or "
+      "simulated:street, simulated:loop, simulated:hover, simulated:turn, simulated:corridor");
   command.add_option(
       "--camera", arguments.camera,
       "Camera of the folder: a preset (tum-fr1 tum-fr2 tum-fr3 bonn 7scenes d435 d455 simulated) "
@@ -67,6 +69,13 @@ void add_topic_options(CLI::App& command, SourceArguments& arguments) {
   command.add_option("--depth", arguments.topics.depth, "Topic of the depth images of a recording");
   command.add_option("--truth", arguments.topics.truth,
                      "Topic of ground truth poses in a recording; of tf, TOPIC:CHILD_FRAME");
+}
+
+void add_stream_option(CLI::App& command, SourceArguments& arguments) {
+  command
+      .add_option("--stream", arguments.stream,
+                  "Images of a camera that is connected: WIDTHxHEIGHT@RATE; fewer a second by USB 2")
+      ->capture_default_str();
 }
 
 void add_mount_option(CLI::App& command, SourceArguments& arguments) {
@@ -132,7 +141,9 @@ void settle_imu(SourceArguments& arguments) {
   arguments.imu = true;
 }
 
-bool is_recorded(const std::string& name) { return !TumSource::recognises(name) && is_recording(name); }
+bool is_recorded(const std::string& name) {
+  return !is_live_camera(name) && !TumSource::recognises(name) && is_recording(name);
+}
 
 bool is_other_dataset(const std::string& name) {
   const auto format = dataset_format(name);
@@ -219,6 +230,14 @@ void refuse_frames(const SourceArguments& arguments) {
                    ": is for a simulated flight only; leave it out with a recording");
 }
 
+std::unique_ptr<FrameSource> open_live(const SourceArguments& arguments) {
+  refuse_frames(arguments);
+  if (!arguments.camera.empty())
+    throw InputError("--camera " + arguments.camera + ": " + arguments.name +
+                     " has its own calibration; leave it out");
+  return open_live_camera(arguments.name, arguments.stream, arguments.mount);
+}
+
 std::unique_ptr<FrameSource> open_recorded(const SourceArguments& arguments) {
   refuse_frames(arguments);
   std::optional<Camera> camera;
@@ -266,6 +285,8 @@ std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
   });
   if (const auto flight = simulated_flight(arguments)) {
     source = std::make_unique<SimulatedSource>(*flight);
+  } else if (is_live_camera(arguments.name)) {
+    source = open_live(arguments);
   } else if (is_recorded(arguments.name)) {
     source = open_recorded(arguments);
   } else if (is_other_dataset(arguments.name)) {

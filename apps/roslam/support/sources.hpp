@@ -17,9 +17,10 @@
 namespace roslam::app {
 
 struct SourceArguments {
-  std::string name;             ///< a TUM folder, a recording or simulated:street|loop|hover|turn
-  std::string camera;           ///< a preset or a file; not needed where the source knows it
-  RecordingChoice topics = {};  ///< of a recording
+  std::string name;    ///< a folder, a recording, realsense[:SERIAL] or simulated:street|loop|hover|turn
+  std::string camera;  ///< a preset or a file; not needed where the source knows it
+  RecordingChoice topics = {};        ///< of a recording
+  std::string stream = "640x480@30";  ///< of a camera that is connected
   std::string mount = {};  ///< of the camera on the drone: X,Y,Z,ROLL,PITCH,YAW; empty: as the camera file
   std::string traffic = "light";  ///< the rest: of a simulated flight; none, light, heavy
   std::size_t frames = 0;         ///< 0 = the whole flight
@@ -42,6 +43,9 @@ void add_flight_options(CLI::App& command, SourceArguments& arguments);
 
 /// Adds --colour, --depth and --truth, which choose topics of a recording; --imu is of the flight options.
 void add_topic_options(CLI::App& command, SourceArguments& arguments);
+
+/// Adds --stream, of a camera that is connected.
+void add_stream_option(CLI::App& command, SourceArguments& arguments);
 
 /// Adds --mount.
 void add_mount_option(CLI::App& command, SourceArguments& arguments);

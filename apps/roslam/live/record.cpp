@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+
+#include "apps/roslam/support/commands.hpp"
+#include "apps/roslam/support/interrupt.hpp"
+#include "apps/roslam/support/live_camera.hpp"
+#include "apps/roslam/support/output.hpp"
+#include "apps/roslam/support/progress.hpp"
+#include "apps/roslam/support/replaces_only.hpp"
+#include "apps/roslam/support/sources.hpp"
+
+namespace roslam::app {
+
+namespace {
+struct RecordArguments {
+  SourceArguments source;
+  std::string out;
+  double seconds = 0.0;
+  bool quiet = false;
+};
+
+void print_counts(const char* what, const std::map<std::string, std::size_t>& counts) {
+  for (const auto& [reason, number] : counts)
+    std::printf("%s%s%s\n", what, reason.c_str(),
+                number > 1 ? (" (" + std::to_string(number) + " times)").c_str() : "");
+}
+
+// A recording that is read and written at once would be destroyed.
+void require_another_file(const RecordArguments& arguments) {
+  std::error_code error;
+  if (std::filesystem::equivalent(arguments.source.name, arguments.out, error))
+    throw InputError("--out " + arguments.out + ": is the source itself; choose another file");
+}
+
+std::size_t record(FrameSource& source, SourceRecorder& recorder, const RecordArguments& arguments,
+                   const std::stop_token& stop) {
+  using Clock = std::chrono::steady_clock;
+  Progress progress(source.size(), arguments.quiet);
+  const auto start = Clock::now();
+  std::optional<double> first;
+  std::size_t frames = 0;
+  while (auto frame = source.next(stop)) {
+    recorder.add(*frame);
+    ++frames;
+    progress.show(frames, "recorded");
+    if (recorder.recorder().has_failed()) break;
+    if (!first) first = frame->timestamp;
+    const double duration = source.is_live() ? std::chrono::duration<double>(Clock::now() - start).count()
+                                             : frame->timestamp - *first;
+    if (arguments.seconds > 0.0 && duration >= arguments.seconds) break;
+  }
+  return frames;
+}
+
+void execute(RecordArguments arguments) {
+  settle_imu(arguments.source);
+  if (arguments.source.name.empty()) throw CLI::RequiredError("SOURCE");
+  require_another_file(arguments);
+  const auto source = open_source(arguments.source);
+  const InterruptWatcher interrupt;
+  SourceRecorder recorder(*source, arguments.out);
+  const std::size_t frames = record(*source, recorder, arguments, interrupt.token());
+  recorder.close();
+  if (frames == 0 && !interrupt.token().stop_requested())
+    throw InputError(arguments.source.name + ": no frame could be recorded" + in_words(source->skipped()));
+  std::printf("frames: %zu\n", frames);
+  print_counts("skipped: ", source->skipped());
+  print_counts("without depth: ", source->skipped_depth());
+  print_counts("note: ", source->notes());
+  std::printf("%s\n", recorder.in_words().c_str());
+  require_written_output();
+}
+}  // namespace
+
+void add_record_command(CLI::App& program) {
+  const auto arguments = std::make_shared<RecordArguments>();
+  CLI::App* command = program.add_subcommand(
+      "record", "Record a camera, or convert another source, to an MCAP file without loss");
+  command->footer(
+      "Examples:\n"
+      "  roslam record realsense --out flight.mcap\n"
+      "  roslam record rgbd_dataset_freiburg1_rpy --camera tum-fr1 --out rpy.mcap\n"
+      "roslam run FILE repeats the flight: the camera, its calibration, inertial samples and true poses are "
+      "in "
+      "the file,\n"
+      "in the topics of ROS 2 drivers. A file whose end is missing, as after a power cut, is read as far as "
+      "it "
+      "is whole.\n"
+      "Ctrl-C ends the recording.\n"
+      "Exit code: 0 success, 1 an error in the input or a full disk, 2 wrong usage.");
+  add_source_options(*command, arguments->source);
+  add_stream_option(*command, arguments->source);
+  add_topic_options(*command, arguments->source);
+  add_mount_option(*command, arguments->source);
+  command->add_option("--out", arguments->out, "File to write (.mcap)")
+      ->required()
+      ->check(ReplacesOnly({"\x89MCAP0\r\n"}));
+  command->add_option("--seconds", arguments->seconds, "End after that time; 0: at the end of the source")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  add_flight_options(*command, arguments->source);
+  command->add_flag("--quiet", arguments->quiet, "Print no progress");
+  command->callback([arguments] { execute(*arguments); });
+}
+
+}  // namespace roslam::app

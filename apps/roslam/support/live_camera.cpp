@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apps/roslam/support/live_camera.hpp"
+
+#include <cstdio>
+
+#include "roslam/cameras/realsense_camera.hpp"
+#include "roslam/geometry/mount.hpp"
+
+namespace roslam::app {
+
+namespace {
+constexpr const char* kRealsense = "realsense";
+
+DepthCameraMode mode_from(const std::string& text) {
+  DepthCameraMode mode;
+  int length = 0;
+  const int found = std::sscanf(text.c_str(), "%5dx%5d@%4d%n", &mode.width, &mode.height, &mode.fps, &length);
+  constexpr int kNumbers = 3;
+  if (found != kNumbers || static_cast<std::size_t>(length) != text.size())
+    throw InputError("--stream " + text + ": write WIDTHxHEIGHT@RATE, such as 640x480@30");
+  return mode;
+}
+
+DepthCameraCalibration calibration_of(const FrameSource& source) {
+  if (const auto* live = dynamic_cast<const LiveSource*>(&source)) return live->calibration();
+  return {source.camera(), source.camera(), SE3()};
+}
+
+CameraRecorderOptions options_of(const FrameSource& source) {
+  CameraRecorderOptions options;
+  options.waits_for_disk = !source.is_live();
+  return options;
+}
+}  // namespace
+
+bool is_live_camera(const std::string& name) {
+  return name == kRealsense || name.starts_with(std::string(kRealsense) + ":");
+}
+
+std::unique_ptr<LiveSource> open_live_camera(const std::string& name, const std::string& stream,
+                                             const std::string& mount) {
+  LiveSourceOptions options;
+  const std::size_t colon = name.find(':');
+  if (colon != std::string::npos) options.serial = name.substr(colon + 1);
+  options.mode = mode_from(stream);
+  std::optional<SE3> T_body_camera;
+  if (!mount.empty()) T_body_camera = mount_from(mount);
+  return std::make_unique<LiveSource>(realsense_camera(), options, T_body_camera);
+}
+
+SourceRecorder::SourceRecorder(FrameSource& source, const std::string& file)
+    : file_(file), is_live_(source.is_live()), recorder_(file, calibration_of(source), options_of(source)) {
+  if (auto* live = dynamic_cast<LiveSource*>(&source))
+    live->on_sample([this](const CameraSample& sample) { recorder_.add(sample); });
+}
+
+void SourceRecorder::add(const Frame& frame) {
+  if (!is_live_) recorder_.add(frame);
+}
+
+std::string SourceRecorder::in_words() const {
+  char size[32];
+  std::snprintf(size, sizeof(size), "%.1f", static_cast<double>(recorder_.bytes()) * 1e-6);
+  std::string words = "recorded: " + file_ + ", " + size + " MB";
+  if (const std::size_t lost = recorder_.lost(); lost > 0)
+    words += "\nWARNING: " + std::to_string(lost) +
+             " images or samples were not recorded, as the disk is too slow for them";
+  return words;
+}
+
+}  // namespace roslam::app
