@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "roslam/common/error.hpp"
+#include "roslam/ros/rvl.hpp"
 #include "roslam/sensors/image_file.hpp"
 
 namespace roslam {
@@ -87,16 +88,16 @@ cv::Mat decoded(std::span<const std::uint8_t> bytes, int flags) {
   return image;
 }
 
-// compressed_depth_image_transport puts the kind of image and two numbers before a PNG. For 32FC1 they say
-// how inverse depth was quantised: depth = first / (value - second).
+// compressed_depth_image_transport puts the kind of image and two numbers before a PNG or RVL. For 32FC1 they
+// say how inverse depth was quantised: depth = first / (value - second).
 cv::Mat compressed_depth(const RosImage& image, double units_per_metre, std::size_t* saturated) {
   constexpr std::size_t kHeader = 12;
   if (image.data.size() <= kHeader) throw InputError("compressedDepth image is truncated");
-  if (image.encoding.find("rvl") != std::string::npos)
-    throw InputError("compressedDepth image of the format RVL, which is not supported; record it as PNG");
   std::array<float, 2> quantisation{};
   std::memcpy(quantisation.data(), image.data.data() + 4, sizeof(quantisation));
-  const cv::Mat raw = decoded(image.data.subspan(kHeader), cv::IMREAD_UNCHANGED);
+  const auto bytes = image.data.subspan(kHeader);
+  const bool is_rvl = image.encoding.find("rvl") != std::string::npos;
+  const cv::Mat raw = is_rvl ? decode_rvl(bytes) : decoded(bytes, cv::IMREAD_UNCHANGED);
   if (raw.type() != CV_16UC1) throw InputError("compressedDepth image is not of 16 bits");
   if (!image.encoding.starts_with("32FC1")) return depth_to_metres(raw, units_per_metre, saturated);
   cv::Mat metres = cv::Mat::zeros(raw.size(), CV_32FC1);
