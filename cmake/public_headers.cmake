@@ -23,6 +23,7 @@ set(ROSLAM_PUBLIC_HEADERS
   sensors/timed_files.hpp
   sensors/tum_source.hpp
   ros/frame_tree.hpp
+  ros/missing_depth.hpp
   recordings/recording.hpp
   ros/recording_contents.hpp
   ros/recording_source.hpp

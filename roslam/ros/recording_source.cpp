@@ -152,8 +152,10 @@ void RecordingSource::accept(Waiting image, Queue& queue, std::map<std::string, 
 std::optional<RecordingSource::Waiting> RecordingSource::take_depth(const Waiting& colour) {
   auto& depths = depth_.images;
   while (!depths.empty() &&
-         order_of(depths.front()) < std::pair(colour.segment, colour.stamp - half_interval_))
+         order_of(depths.front()) < std::pair(colour.segment, colour.stamp - half_interval_)) {
+    passed_depth_ = order_of(depths.front());
     depths.pop_front();
+  }
   const auto is_near = [&](const Waiting& depth) {
     return depth.segment == colour.segment && distance(depth.stamp, colour.stamp) <= half_interval_;
   };
@@ -171,9 +173,29 @@ std::optional<RecordingSource::Waiting> RecordingSource::take_depth(const Waitin
       nearest = depths.end();
   }
   if (nearest == depths.end()) return std::nullopt;
+  passed_depth_ = order_of(*nearest);
   std::optional<Waiting> taken = std::move(*nearest);
   depths.erase(depths.begin(), std::next(nearest));
   return taken;
+}
+
+// How far the nearest depth image is from a colour image that has none.
+void RecordingSource::add_missing_depth(const Waiting& colour) {
+  std::optional<std::int64_t> nearest;
+  const auto offer = [&](const std::pair<int, std::int64_t>& depth) {
+    if (depth.first != colour.segment) return;
+    const std::int64_t apart = distance(depth.second, colour.stamp);
+    nearest = std::min(apart, nearest.value_or(apart));
+  };
+  if (passed_depth_) offer(*passed_depth_);
+  for (const Waiting& depth : depth_.images) offer(order_of(depth));
+  missing_depth_.add(nearest, half_interval_);
+}
+
+std::map<std::string, std::size_t> RecordingSource::skipped_depth() const {
+  auto skipped = skipped_depth_;
+  missing_depth_.add_to(skipped);
+  return skipped;
 }
 
 std::optional<Frame> RecordingSource::frame_of(const Waiting& colour, const std::optional<Waiting>& depth) {
@@ -196,7 +218,7 @@ std::optional<Frame> RecordingSource::frame_of(const Waiting& colour, const std:
   if (depth) {
     frame.depth = depth_image(*depth);
   } else {
-    ++skipped_depth_["no depth image near in time"];
+    add_missing_depth(colour);
   }
   take_inertial(frame);
   frame.T_world_camera = truth_at(frame.timestamp);

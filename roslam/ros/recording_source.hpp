@@ -8,10 +8,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "roslam/common/export.hpp"
 #include "roslam/geometry/trajectory.hpp"
+#include "roslam/ros/missing_depth.hpp"
 #include "roslam/ros/recording_streams.hpp"
 #include "roslam/sensors/depth_registration.hpp"
 #include "roslam/sensors/frame_source.hpp"
@@ -35,7 +37,7 @@ class ROSLAM_EXPORT RecordingSource : public FrameSource {
   const Camera& camera() const override { return streams_.camera; }
   std::optional<std::size_t> size() const override { return streams_.colour.topic.messages; }
   std::map<std::string, std::size_t> skipped() const override { return skipped_; }
-  std::map<std::string, std::size_t> skipped_depth() const override { return skipped_depth_; }
+  std::map<std::string, std::size_t> skipped_depth() const override;
   std::map<std::string, std::size_t> notes() const override;
 
   /// What was chosen.
@@ -66,6 +68,7 @@ class ROSLAM_EXPORT RecordingSource : public FrameSource {
   void add_truth(std::span<const std::uint8_t> message);
   bool is_decided() const;
   std::optional<Waiting> take_depth(const Waiting& colour);
+  void add_missing_depth(const Waiting& colour);
   std::optional<Frame> frame_of(const Waiting& colour, const std::optional<Waiting>& depth);
   cv::Mat depth_image(const Waiting& depth);
   void take_inertial(Frame& frame);
@@ -79,6 +82,8 @@ class ROSLAM_EXPORT RecordingSource : public FrameSource {
   std::int64_t half_interval_ = 0;  // nanoseconds
   bool is_at_end_ = false;
   Queue colour_, depth_;
+  std::optional<std::pair<int, std::int64_t>> passed_depth_;  // segment and stamp, taken or left behind
+  MissingDepth missing_depth_;
   std::deque<InertialSample> inertial_;
   std::optional<Eigen::Vector3d> acceleration_;  // newest of an accelerometer of its own
   std::deque<StampedPose> truth_;                // of the camera
