@@ -317,7 +317,7 @@ TEST_F(RecordingFrames, ThatAreDamagedAreSkippedAndCounted) {
   const auto source = open({}, small_camera());
   const auto frames = all(*source);
   ASSERT_EQ(frames.size(), 9U);
-  EXPECT_EQ(source->skipped().at("compressed image cannot be decoded"), 1U);
+  EXPECT_EQ(source->skipped().at("compressed image is neither JPEG nor PNG"), 1U);
   EXPECT_EQ(source->skipped_depth().at("message is truncated"), 1U);
 }
 

@@ -74,7 +74,18 @@ cv::Mat raw_pixels(const RosImage& image, const Encoding& encoding) {
   return aligned;
 }
 
+// OpenCV would try all formats that it has been built with, some of which allocate what damaged bytes say.
+bool is_jpeg_or_png(std::span<const std::uint8_t> bytes) {
+  constexpr std::array<std::uint8_t, 3> kJpeg{0xff, 0xd8, 0xff};
+  constexpr std::array<std::uint8_t, 8> kPng{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  const auto begins_with = [&](const auto& mark) {
+    return bytes.size() > mark.size() && std::equal(mark.begin(), mark.end(), bytes.begin());
+  };
+  return begins_with(kJpeg) || begins_with(kPng);
+}
+
 cv::Mat decoded(std::span<const std::uint8_t> bytes, int flags) {
+  if (!is_jpeg_or_png(bytes)) throw InputError("compressed image is neither JPEG nor PNG");
   if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
     throw InputError("compressed image is too large");
   cv::Mat image;
