@@ -22,6 +22,7 @@ set(ROSLAM_PUBLIC_HEADERS
   sensors/image_file.hpp
   sensors/inertial_queue.hpp
   sensors/inertial_sample.hpp
+  sensors/missing_depth.hpp
   sensors/stream_pairing.hpp
   sensors/timed_files.hpp
   datasets/tum_source.hpp

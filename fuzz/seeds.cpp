@@ -14,6 +14,7 @@
 #include "tests/onnx_writer.hpp"
 #include "tests/recording_writers.hpp"
 #include "tests/ros_writer.hpp"
+#include "tests/rvl_writer.hpp"
 
 namespace {
 using namespace roslam;
@@ -144,6 +145,10 @@ void put_messages(const std::filesystem::path& folder) {
     put(10 + odd, ros::imu(version, 1000, "a", {0, 0, 1}, {0, 0, 9.8}));
     put(12 + odd, ros::image(version, 1000, "a", "16UC1", cv::Mat(8, 8, CV_16UC1, cv::Scalar(1000))));
     put(14 + odd, ros::compressed_image(version, 1000, "a", "16UC1; compressedDepth png", ros::Bytes(40, 1)));
+    ros::Bytes rvl(12, 0);
+    const ros::Bytes stream = ros::RvlWriter::encode(cv::Mat(8, 8, CV_16UC1, cv::Scalar(1000)));
+    rvl.insert(rvl.end(), stream.begin(), stream.end());
+    put(30 + odd, ros::compressed_image(version, 1000, "a", "16UC1; compressedDepth rvl", rvl));
   }
 }
 

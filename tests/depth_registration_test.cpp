@@ -145,6 +145,19 @@ TEST(DepthRegistration, WorksForACameraThatIsMountedUpsideDown) {
   expect_agreement(compare(depth_camera(), colour_camera(), turned), 60000);
 }
 
+TEST(DepthRegistration, WorksForACameraThatIsTurnedOnItsSide) {
+  const SE3 turned(Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d::UnitZ())),
+                   {0.05, 0.0, 0.0});
+  expect_agreement(compare(depth_camera(), colour_camera(), turned), 50000);
+}
+
+TEST(DepthRegistration, BringsDepthIntoTheImageOfAFisheye) {
+  Camera colour = colour_camera();
+  colour.fx = colour.fy = 130.0;  // most of the pinhole's image is far outside 424 x 240
+  colour.set_lens("fisheye", {0.02, -0.004, 0.001, -0.0002});
+  expect_agreement(compare(depth_camera(), colour, kBeside), 20000);
+}
+
 TEST(DepthRegistration, PassesOnWhatIsRegisteredAlready) {
   const Camera camera = depth_camera();
   const DepthRegistration registration(camera, camera, SE3());

@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "roslam/common/error.hpp"
+#include "roslam/sensors/counts.hpp"
 #include "tests/recording_writers.hpp"
 #include "tests/ros_writer.hpp"
 #include "tests/scratch.hpp"
@@ -136,7 +137,25 @@ TEST_F(RecordingFrames, ArePairedByTheirStampsNotByWhenTheyWereRecorded) {
       EXPECT_FLOAT_EQ(image.at<float>(0, 0), 0.001F * static_cast<float>(1000 + i));
     }
   }
-  EXPECT_EQ(source->skipped_depth().at("no depth image near in time"), 1U);
+  EXPECT_EQ(source->skipped_depth(), (Counts{{"no depth image near in time: the nearest is 60 ms from the "
+                                              "colour image, at most 50 ms is taken as one moment",
+                                              1}}));
+}
+
+TEST_F(RecordingFrames, SayHowFarTheNearestDepthImageIs) {
+  const int colour = topic("/rgb/image", "sensor_msgs/Image"),
+            depth = topic("/depth/image", "sensor_msgs/Image");
+  for (int i = 0; i < 10; ++i) {
+    const std::int64_t t = kBegin + i * kFrame;
+    put(colour, t, ros::image(kVersion, t, "", "bgr8", colour_image(i)));
+    if (i == 4) put(depth, t + 1, ros::image(kVersion, t, "", "16UC1", depth_image(i)));
+  }
+  const auto source = open({}, small_camera());
+  EXPECT_EQ(all(*source).size(), 10U);
+  EXPECT_EQ(source->skipped_depth(),
+            (Counts{{"no depth image near in time: the nearest is 100 to 500 ms from "
+                     "the colour image, at most 50 ms is taken as one moment",
+                     9}}));
 }
 
 TEST_F(RecordingFrames, OfTwiceTheRateShareNoDepthImage) {
@@ -298,7 +317,7 @@ TEST_F(RecordingFrames, ThatAreDamagedAreSkippedAndCounted) {
   const auto source = open({}, small_camera());
   const auto frames = all(*source);
   ASSERT_EQ(frames.size(), 9U);
-  EXPECT_EQ(source->skipped().at("compressed image cannot be decoded"), 1U);
+  EXPECT_EQ(source->skipped().at("compressed image is neither JPEG nor PNG"), 1U);
   EXPECT_EQ(source->skipped_depth().at("message is truncated"), 1U);
 }
 
@@ -483,6 +502,9 @@ TEST(RealSenseBag, OpensWithoutACameraAndRegistersDepth) {
   ASSERT_TRUE(frame);
   EXPECT_TRUE(frame->depth.empty());
   EXPECT_FALSE(source.next());
+  EXPECT_EQ(source.skipped_depth(), (Counts{{"no depth image near in time: the nearest is 101 ms from the "
+                                             "colour image, at most 83 ms is taken as one moment",
+                                             1}}));
   const DepthRegistration registration(source.streams().depth_camera, source.camera(),
                                        *source.streams().T_colour_depth);
   recording->select({source.streams().depth.topic.id});

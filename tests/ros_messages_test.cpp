@@ -102,9 +102,13 @@ TEST_P(Messages, CompressedImages) {
   const Bytes rvl_message =
       ros::compressed_image(GetParam(), kStamp, "camera", "16UC1; compressedDepth rvl", with_header);
   EXPECT_THROW(depth_pixels(decode_compressed_image(rvl_message, encoding()), 1000.0), InputError);
-  png.resize(png.size() / 2);
-  const Bytes cut_message = ros::compressed_image(GetParam(), kStamp, "camera", "png", Bytes{1, 2, 3});
-  EXPECT_THROW(colour_pixels(decode_compressed_image(cut_message, encoding())), InputError);
+  Bytes bitmap;
+  cv::imencode(".bmp", pixels, bitmap);
+  png.resize(20);
+  for (const Bytes& data : {png, bitmap, Bytes{1, 2, 3}}) {
+    const Bytes bad = ros::compressed_image(GetParam(), kStamp, "camera", "png", data);
+    EXPECT_THROW(colour_pixels(decode_compressed_image(bad, encoding())), InputError);
+  }
 }
 
 TEST_P(Messages, ACalibration) {

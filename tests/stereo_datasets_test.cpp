@@ -206,18 +206,19 @@ TEST_F(Stereo, EurocWithInertialSamples) {
   }
   put("mav0/cam0/sensor.yaml", sensor(T_body_left) +
                                    "resolution: [64, 48]\nintrinsics: [61, 58, 30.5, 25]\n"
-                                   "distortion_model: omnidirectional\n");
-  EXPECT_NE(refused({}, DatasetUse::kImagesOnly).find("distortion model 'omnidirectional' is not supported"),
-            std::string::npos);
+                                   "distortion_model: omnidirectional\ndistortion_coefficients: [0.1]\n");
+  EXPECT_NE(
+      refused({}, DatasetUse::kImagesOnly).find("has the distortion model 'omnidirectional'; supported: "),
+      std::string::npos);
   const std::string fisheye = sensor(T_body_left) +
                               "resolution: [64, 48]\nintrinsics: [61, 58, 30.5, 25]\n"
                               "distortion_model: equidistant\ndistortion_coefficients: ";
   put("mav0/cam0/sensor.yaml", fisheye + "[0.01, 0.002, 0, 0]\n");
   EXPECT_EQ(open_dataset(folder_, {}, DatasetUse::kImagesOnly)->camera().model, LensModel::kFisheye);
   put("mav0/cam0/sensor.yaml", fisheye + "[0.01, 0.002]\n");
-  EXPECT_NE(refused({}, DatasetUse::kImagesOnly).find("'distortion_coefficients'"), std::string::npos);
+  EXPECT_NE(refused({}, DatasetUse::kImagesOnly).find("distortion has 2 values"), std::string::npos);
   put("mav0/cam0/sensor.yaml", "resolution: [64, 48, 1]\nintrinsics: [61, 58, 30.5, 25]\n");
-  EXPECT_NE(refused({}, DatasetUse::kImagesOnly).find("'resolution' has 3 numbers and not 2"),
+  EXPECT_NE(refused({}, DatasetUse::kImagesOnly).find("has 3 numbers in 'resolution', not 2"),
             std::string::npos);
   put("mav0/cam0/data.csv", "1,a.png\nsoon,b.png\n");
   put("mav0/cam0/sensor.yaml", sensor(T_body_left) + camera);

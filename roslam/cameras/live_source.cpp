@@ -263,7 +263,7 @@ std::optional<Frame> LiveSource::frame_of(Pairing::Pair images) {
   if (images.depth) {
     frame.depth = registered(images.depth->content.pixels);
   } else {
-    ++skipped_depth_["no depth image near in time"];
+    missing_depth_.add(images.nearest, pairing_.options().half_interval);
   }
   frame.inertial = inertial_.take_until(frame.timestamp, frame.segment);
   return frame;
@@ -290,6 +290,7 @@ Counts LiveSource::skipped() const {
 Counts LiveSource::skipped_depth() const {
   Counts counts = skipped_depth_;
   merge(pairing_.skipped_depth(), counts);
+  missing_depth_.add_to(counts);
   return counts;
 }
 

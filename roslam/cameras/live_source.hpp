@@ -17,6 +17,7 @@
 #include "roslam/sensors/depth_registration.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/sensors/inertial_queue.hpp"
+#include "roslam/sensors/missing_depth.hpp"
 #include "roslam/sensors/stream_pairing.hpp"
 
 namespace roslam {
@@ -95,6 +96,7 @@ class ROSLAM_EXPORT LiveSource : public FrameSource {
   DepthCameraCalibration calibration_;
   std::optional<DepthRegistration> registration_;
   Pairing pairing_;
+  MissingDepth missing_depth_;
   InertialQueue inertial_;
   ExposureSettling settling_;
 

@@ -6,11 +6,11 @@
 #include <string>
 
 #include "roslam/common/error.hpp"
-#include "roslam/datasets/calibration_yaml.hpp"
 #include "roslam/datasets/formats.hpp"
 #include "roslam/datasets/inertial_lists.hpp"
 #include "roslam/datasets/text_numbers.hpp"
 #include "roslam/datasets/tum_source.hpp"
+#include "roslam/geometry/camera_formats.hpp"
 #include "roslam/sensors/ground_truth.hpp"
 
 namespace roslam::datasets {
@@ -24,28 +24,19 @@ Path sensors_of(const Path& folder) {
   return is_present(folder / "mav0" / "cam0" / "data.csv") ? folder / "mav0" : folder;
 }
 
-struct AslCamera {
+struct Sensor {
   Camera camera;
   SE3 T_body_sensor;
 };
 
-AslCamera read_sensor(const Path& folder) {
-  const CalibrationYaml file(folder / "sensor.yaml", "it comes with the sequence");
-  const YAML::Node& root = file.root();
-  const auto size = file.numbers(root, "resolution", 2);
-  const auto intrinsics = file.numbers(root, "intrinsics", 4);
-  AslCamera sensor;
-  const bool has_size = size[0] >= 1.0 && size[0] <= 1e6 && size[1] >= 1.0 && size[1] <= 1e6;
-  sensor.camera.width = has_size ? static_cast<int>(size[0]) : 0;
-  sensor.camera.height = has_size ? static_cast<int>(size[1]) : 0;
-  sensor.camera.fx = intrinsics[0];
-  sensor.camera.fy = intrinsics[1];
-  sensor.camera.cx = intrinsics[2];
-  sensor.camera.cy = intrinsics[3];
-  file.set_lens(root, "distortion_model", "distortion_coefficients", sensor.camera);
-  if (root["rate_hz"]) sensor.camera.fps = file.number(root, "rate_hz");
-  sensor.T_body_sensor = file.transform(root, "T_BS");
-  return sensor;
+CalibrationPart open_sensor(const Path& folder) {
+  return open_calibration(folder / "sensor.yaml", "it comes with the sequence");
+}
+
+// given: in place of the calibration.
+Sensor read_sensor(const Path& folder, const GivenCamera& given) {
+  const CalibrationPart file = open_sensor(folder);
+  return {given ? *given : read_asl_camera(file).camera, file.transform("T_BS")};
 }
 
 TimedFileList read_images(const Path& folder) {
@@ -90,9 +81,9 @@ Trajectory read_body_poses(const Path& file, Counts& notes) {
   return poses;
 }
 
-void add_right_camera(const Path& sensors, const AslCamera& left, FolderListing& listing) {
+void add_right_camera(const Path& sensors, const Sensor& left, FolderListing& listing) {
   if (!is_present(sensors / "cam1" / "data.csv") || !is_present(sensors / "cam1" / "sensor.yaml")) return;
-  const AslCamera right = read_sensor(sensors / "cam1");
+  const Sensor right = read_sensor(sensors / "cam1", std::nullopt);
   Counts skipped;  // right images are not frames
   const auto files =
       ordered_entries("cam1/data.csv", "right image", read_images(sensors / "cam1"), listing.notes, skipped);
@@ -105,16 +96,11 @@ void add_right_camera(const Path& sensors, const AslCamera& left, FolderListing&
   listing.right = {right.camera, left.T_body_sensor.inverse() * right.T_body_sensor};
 }
 
-void add_inertial(const Path& folder, const AslCamera& left, FolderListing& listing) {
+void add_inertial(const Path& folder, const Sensor& left, FolderListing& listing) {
   if (!is_present(folder / "data.csv") || !is_present(folder / "sensor.yaml")) return;
-  const CalibrationYaml file(folder / "sensor.yaml", "it comes with the sequence");
   listing.inertial = read_inertial_table(folder / "data.csv", kNanosecond, listing.notes);
   if (listing.inertial.empty() || listing.camera.imu) return;
-  ImuCalibration imu;
-  imu.T_camera_imu = left.T_body_sensor.inverse() * file.transform(file.root(), "T_BS");
-  imu.gyroscope_noise = file.number(file.root(), "gyroscope_noise_density");
-  imu.gyroscope_walk = file.number(file.root(), "gyroscope_random_walk");
-  listing.camera.imu = imu;
+  listing.camera.imu = read_asl_unit(open_sensor(folder), left.T_body_sensor.inverse());
 }
 }  // namespace
 
@@ -122,8 +108,8 @@ bool is_euroc(const Path& folder) { return is_present(sensors_of(folder) / "cam0
 
 FolderListing list_euroc(const Path& folder, const GivenCamera& camera) {
   const Path sensors = sensors_of(folder);
-  const AslCamera left = read_sensor(sensors / "cam0");
-  FolderListing listing{folder.string(), camera.value_or(left.camera), {}};
+  const Sensor left = read_sensor(sensors / "cam0", camera);
+  FolderListing listing{folder.string(), left.camera, {}};
   for (const TimedFile& entry : ordered_entries(
            "cam0/data.csv", "colour image", read_images(sensors / "cam0"), listing.notes, listing.skipped))
     listing.frames.push_back({entry.timestamp, entry.segment, entry.file, {}, {}, std::nullopt});

@@ -7,11 +7,11 @@
 #include <string>
 
 #include "roslam/common/error.hpp"
-#include "roslam/datasets/calibration_yaml.hpp"
 #include "roslam/datasets/formats.hpp"
 #include "roslam/datasets/inertial_lists.hpp"
 #include "roslam/datasets/paired_lists.hpp"
 #include "roslam/datasets/text_numbers.hpp"
+#include "roslam/geometry/camera_formats.hpp"
 #include "roslam/sensors/ground_truth.hpp"
 
 namespace roslam::datasets {
@@ -21,21 +21,22 @@ constexpr const char* kColourFrame = "d400_color_optical_frame";
 constexpr double kMaxTimeDifference = 0.02;  // seconds
 
 Camera camera_of(const Path& folder) {
-  const CalibrationYaml file(folder / "sensors.yaml", "it comes with the sequence, or give --camera FILE");
-  const YAML::Node node = file.root()[kColourFrame];
-  if (!node)
-    throw InputError((folder / "sensors.yaml").string() + ": has no '" + kColourFrame +
-                     "'; give --camera FILE");
-  const auto intrinsics = file.numbers(node, "intrinsics", 4);
+  const CalibrationPart file =
+      open_calibration(folder / "sensors.yaml", "it comes with the sequence, or give --camera FILE");
+  if (!file.has(kColourFrame)) file.fail("has no '" + std::string(kColourFrame) + "'; give --camera FILE");
+  const CalibrationPart part = file.part(kColourFrame);
+  const auto intrinsics = part.numbers("intrinsics", 4);
   Camera camera;
-  camera.width = file.integer(node, "width");
-  camera.height = file.integer(node, "height");
+  camera.width = part.pixels("width");
+  camera.height = part.pixels("height");
   camera.fx = intrinsics[0];
   camera.cx = intrinsics[1];
   camera.fy = intrinsics[2];
   camera.cy = intrinsics[3];
-  file.set_lens(node, "distortion_model", "distortion_coefficients", camera);
-  if (node["fps"]) camera.fps = file.number(node, "fps");
+  const std::string model = part.text("distortion_model", "none");
+  set_lens(camera, part, model,
+           model == "none" ? std::vector<double>{} : part.numbers("distortion_coefficients"));
+  camera.fps = part.number("fps", camera.fps);
   camera.depth_units_per_metre = 1000.0;
   camera.depth_noise = camera_preset("d435")->depth_noise;
   return camera;
@@ -45,18 +46,19 @@ Camera camera_of(const Path& folder) {
 // base.
 std::optional<SE3> mounted_at(const Path& folder, std::string frame) {
   if (!is_present(folder / "trans_matrix.yaml")) return std::nullopt;
-  const CalibrationYaml file(folder / "trans_matrix.yaml", "it comes with the sequence");
-  const YAML::Node list = file.root()["trans_matrix"];
-  if (!list || !list.IsSequence()) return std::nullopt;
+  const CalibrationPart file = open_calibration(folder / "trans_matrix.yaml", "it comes with the sequence");
+  if (!file.has("trans_matrix") || !file.node()["trans_matrix"].IsSequence()) return std::nullopt;
+  std::vector<CalibrationPart> entries;
+  for (const YAML::Node& entry : file.node()["trans_matrix"]) entries.emplace_back(file.name(), "", entry);
   SE3 T_parent_sensor;
   constexpr int kMostParents = 20;  // of a chain without a circle
   for (int i = 0; i < kMostParents && frame != "base_link"; ++i) {
-    const auto found = std::find_if(list.begin(), list.end(), [&](const YAML::Node& entry) {
-      return file.text(entry, "child_frame") == frame;
+    const auto found = std::find_if(entries.begin(), entries.end(), [&](const CalibrationPart& entry) {
+      return entry.text("child_frame", "") == frame;
     });
-    if (found == list.end()) return std::nullopt;
-    T_parent_sensor = file.transform(*found, "matrix") * T_parent_sensor;
-    frame = file.text(*found, "parent_frame");
+    if (found == entries.end()) return std::nullopt;
+    T_parent_sensor = found->transform("matrix") * T_parent_sensor;
+    frame = found->text("parent_frame", "");
   }
   return frame == "base_link" ? std::make_optional(T_parent_sensor) : std::nullopt;
 }

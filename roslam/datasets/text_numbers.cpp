@@ -106,14 +106,11 @@ std::optional<Eigen::Matrix4d> read_matrix(const fs::path& file) {
   return matrix_from(numbers);
 }
 
-std::optional<SE3> rigid_transform(const Eigen::Matrix4d& matrix) {
-  constexpr double kRounding = 1e-2;  // of files that state few decimals
-  if (!matrix.allFinite()) return std::nullopt;
-  const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
-  const bool is_rigid = (R * R.transpose()).isIdentity(kRounding) && R.determinant() > 0.0 &&
-                        matrix.row(3).isApprox(Eigen::RowVector4d::Unit(3), kRounding);
-  if (!is_rigid) return std::nullopt;
-  return SE3(R, matrix.topRightCorner<3, 1>());
+CalibrationPart open_calibration(const fs::path& file, const std::string& remedy) {
+  std::error_code error;
+  const std::string if_missing = "cannot open it; " + remedy;
+  if (!fs::is_regular_file(file, error)) throw InputError(file.string() + ": " + if_missing);
+  return {file.string(), "", load_calibration(file, if_missing)};
 }
 
 Eigen::Matrix4d matrix_from(const std::vector<double>& numbers) {

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "roslam/geometry/calibration_file.hpp"
 #include "roslam/geometry/se3.hpp"
 
 namespace roslam::datasets {
@@ -36,8 +37,9 @@ void for_each_line(const std::filesystem::path& file, const std::string& remedy,
 /// The 4x4 matrix of a file, row by row; nothing if the file is missing or is no such matrix.
 std::optional<Eigen::Matrix4d> read_matrix(const std::filesystem::path& file);
 
-/// A matrix as a rigid transform; nothing if it is none, such as one of infinite numbers.
-std::optional<SE3> rigid_transform(const Eigen::Matrix4d& matrix);
+/// A file of calibration in YAML. remedy: what to do if it is missing. Throws InputError if it is no regular
+/// file, cannot be read, or is larger than 1 MB.
+CalibrationPart open_calibration(const std::filesystem::path& file, const std::string& remedy);
 
 /// Sixteen numbers as a matrix, row by row.
 Eigen::Matrix4d matrix_from(const std::vector<double>& numbers);

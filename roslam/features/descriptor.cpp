@@ -3,14 +3,7 @@
 
 #include <algorithm>
 
-// One binary serves processors with and without a population count instruction: the loader picks the version.
-// Sanitizers cannot instrument the resolver that does so, hence the exception.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define ROSLAM_POPCOUNT_CLONES __attribute__((target_clones("popcnt", "default")))
-#else
-#define ROSLAM_POPCOUNT_CLONES
-#endif
+#include "roslam/common/target_clones.hpp"
 
 namespace roslam {
 
@@ -33,18 +26,20 @@ namespace {
   }
 }
 
-ROSLAM_POPCOUNT_CLONES int hamming_clone(const Descriptor& a, const Descriptor& b) { return distance(a, b); }
+ROSLAM_TARGET_CLONES("popcnt") int hamming_clone(const Descriptor& a, const Descriptor& b) {
+  return distance(a, b);
+}
 
-ROSLAM_POPCOUNT_CLONES void search_candidates(const Descriptor& query, const Descriptor* pool,
-                                              const std::uint32_t* candidates, std::size_t count,
-                                              NearestTwo& nearest) {
+ROSLAM_TARGET_CLONES("popcnt")
+void search_candidates(const Descriptor& query, const Descriptor* pool, const std::uint32_t* candidates,
+                       std::size_t count, NearestTwo& nearest) {
   for (std::size_t i = 0; i < count; ++i) {
     offer(nearest, static_cast<int>(candidates[i]), distance(query, pool[candidates[i]]));
   }
 }
 
-ROSLAM_POPCOUNT_CLONES void search_all(const Descriptor& query, const Descriptor* pool, std::size_t count,
-                                       NearestTwo& nearest) {
+ROSLAM_TARGET_CLONES("popcnt")
+void search_all(const Descriptor& query, const Descriptor* pool, std::size_t count, NearestTwo& nearest) {
   for (std::size_t i = 0; i < count; ++i) offer(nearest, static_cast<int>(i), distance(query, pool[i]));
 }
 }  // namespace

@@ -86,22 +86,28 @@ YAML::Node load_calibration(const std::filesystem::path& file, const std::string
   }
 }
 
-std::optional<SE3> rigid_transform(const std::vector<double>& values) {
-  constexpr double kRounding = 1e-3;
-  if (values.size() != 16) return std::nullopt;
-  const Eigen::Matrix4d T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
-  const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
-  const bool is_rigid = T.allFinite() && (R * R.transpose()).isIdentity(kRounding) && R.determinant() > 0.0 &&
-                        T.row(3).isApprox(Eigen::RowVector4d::Unit(3));
+std::optional<SE3> rigid_transform(const Eigen::Matrix4d& matrix) {
+  constexpr double kRounding = 1e-2;
+  if (!matrix.allFinite()) return std::nullopt;
+  const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
+  const bool is_rigid = (R * R.transpose()).isIdentity(kRounding) && R.determinant() > 0.0 &&
+                        matrix.row(3).isApprox(Eigen::RowVector4d::Unit(3), kRounding);
   if (!is_rigid) return std::nullopt;
-  return SE3(R, T.topRightCorner<3, 1>());
+  return SE3(R, matrix.topRightCorner<3, 1>());
+}
+
+std::optional<SE3> rigid_transform(const std::vector<double>& values) {
+  if (values.size() != 16) return std::nullopt;
+  const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(values.data());
+  return rigid_transform(Eigen::Matrix4d(matrix));
 }
 
 CalibrationPart::CalibrationPart(std::string name, std::string format, YAML::Node node, std::string where)
     : name_(std::move(name)), format_(std::move(format)), node_(std::move(node)), where_(std::move(where)) {}
 
 void CalibrationPart::fail(const std::string& why) const {
-  throw InputError(name_ + ": recognised as " + format_ + ": " + (where_.empty() ? "" : where_ + " ") + why);
+  throw InputError(name_ + ": " + (format_.empty() ? "" : "recognised as " + format_ + ": ") +
+                   (where_.empty() ? "" : where_ + " ") + why);
 }
 
 bool CalibrationPart::has(const std::string& key) const {

@@ -25,7 +25,7 @@ YAML::Node nodes_of_xml(const std::string& text, const std::string& name);
 /// its format and the key.
 class CalibrationPart {
  public:
-  /// name: of the file; format: in words; both for messages. where: the keys above, for messages.
+  /// name: of the file; format: in words, or empty; both for messages. where: the keys above, for messages.
   CalibrationPart(std::string name, std::string format, YAML::Node node, std::string where = {});
 
   bool has(const std::string& key) const;
@@ -60,7 +60,10 @@ class CalibrationPart {
   std::string where_;
 };
 
-/// A rigid transform of 16 numbers, row by row; nothing if they are none.
+/// A matrix as a rigid transform; nothing if it is none, to 0.01, as files state few decimals.
+std::optional<SE3> rigid_transform(const Eigen::Matrix4d& matrix);
+
+/// The same of 16 numbers, row by row.
 std::optional<SE3> rigid_transform(const std::vector<double>& values);
 
 }  // namespace roslam

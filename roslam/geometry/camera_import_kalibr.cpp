@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 // What both formats share: camera_model, intrinsics, distortion_model, resolution.
 Camera pinhole_of(const CalibrationPart& file, const std::string& coefficients) {
   Camera camera;
-  if (const auto model = file.text("camera_model"); model != "pinhole")
+  if (const auto model = file.text("camera_model", "pinhole"); model != "pinhole")
     file.fail("has the camera_model '" + model +
               "'; only pinhole is supported, calibrate with pinhole-radtan " + "or pinhole-equi");
   const auto intrinsics = file.numbers("intrinsics", 4);
@@ -41,18 +41,29 @@ std::string cameras_in(const YAML::Node& chain) {
   return names;
 }
 
-// imu0/sensor.yaml beside the folder of the camera: noise of the gyroscope and, if it is not the identity as
-// in EuRoC, the pose of the unit in the body.
-void read_unit(const fs::path& file, ImuCalibration& imu) {
+// imu0/sensor.yaml beside the folder of the camera.
+std::optional<CalibrationPart> unit_beside(const CalibrationPart& camera) {
+  const fs::path file = fs::path(camera.name()).parent_path() / ".." / "imu0" / "sensor.yaml";
   std::error_code error;
-  if (!fs::is_regular_file(file, error)) return;
-  const CalibrationPart unit(file.string(), "an ASL (EuRoC) sensor.yaml",
-                             load_calibration(file, "is missing"));
-  imu.gyroscope_noise = unit.number("gyroscope_noise_density", imu.gyroscope_noise);
-  imu.gyroscope_walk = unit.number("gyroscope_random_walk", imu.gyroscope_walk);
-  if (unit.has("T_BS")) imu.T_camera_imu = imu.T_camera_imu * unit.transform("T_BS");
+  if (!fs::is_regular_file(file, error)) return std::nullopt;
+  return CalibrationPart(file.string(), camera.format(), load_calibration(file, "is missing"));
 }
 }  // namespace
+
+AslCamera read_asl_camera(const CalibrationPart& file) {
+  AslCamera sensor{pinhole_of(file, "distortion_coefficients"), std::nullopt};
+  sensor.camera.fps = file.number("rate_hz", sensor.camera.fps);
+  if (file.has("T_BS")) sensor.T_body_sensor = file.transform("T_BS");
+  return sensor;
+}
+
+ImuCalibration read_asl_unit(const CalibrationPart& file, const SE3& T_camera_body) {
+  ImuCalibration imu{T_camera_body};
+  imu.gyroscope_noise = file.number("gyroscope_noise_density", imu.gyroscope_noise);
+  imu.gyroscope_walk = file.number("gyroscope_random_walk", imu.gyroscope_walk);
+  if (file.has("T_BS")) imu.T_camera_imu = T_camera_body * file.transform("T_BS");
+  return imu;
+}
 
 ImportedCamera read_kalibr(const CalibrationPart& file, int number) {
   const std::string name = "cam" + std::to_string(number);
@@ -75,13 +86,14 @@ ImportedCamera read_kalibr(const CalibrationPart& file, int number) {
 ImportedCamera read_asl(const CalibrationPart& file) {
   if (const auto type = file.text("sensor_type", "camera"); type != "camera")
     file.fail("is of a sensor of the type " + type + "; give that of a camera, such as cam0/sensor.yaml");
-  ImportedCamera imported{pinhole_of(file, "distortion_coefficients"), {}, {}};
-  imported.camera.fps = file.number("rate_hz", imported.camera.fps);
-  if (file.has("T_BS")) {
+  const AslCamera sensor = read_asl_camera(file);
+  ImportedCamera imported{sensor.camera, {}, {}};
+  if (sensor.T_body_sensor) {
     // The body of these data sets is the inertial measurement unit; how it is turned in the vehicle is not
     // told, so T_body_camera keeps its default.
-    imported.camera.imu = ImuCalibration{file.transform("T_BS").inverse()};
-    read_unit(fs::path(file.name()).parent_path() / ".." / "imu0" / "sensor.yaml", *imported.camera.imu);
+    const SE3 T_camera_body = sensor.T_body_sensor->inverse();
+    const auto unit = unit_beside(file);
+    imported.camera.imu = unit ? read_asl_unit(*unit, T_camera_body) : ImuCalibration{T_camera_body};
     imported.notes.emplace_back("T_BS is taken as the pose of the camera in the frame of the inertial unit");
   }
   return imported;

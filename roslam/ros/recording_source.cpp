@@ -64,6 +64,7 @@ std::map<std::string, std::size_t> RecordingSource::skipped() const {
 std::map<std::string, std::size_t> RecordingSource::skipped_depth() const {
   auto skipped = skipped_depth_;
   add_counts(pairing_.skipped_depth(), skipped);
+  missing_depth_.add_to(skipped);
   return skipped;
 }
 
@@ -123,7 +124,7 @@ std::optional<Frame> RecordingSource::frame_of(const Pairing::Pair& images) {
   if (images.depth) {
     frame.depth = depth_image(*images.depth);
   } else {
-    ++skipped_depth_["no depth image near in time"];
+    missing_depth_.add(images.nearest, pairing_.options().half_interval);
   }
   frame.inertial = inertial_.take_until(frame.timestamp, frame.segment);
   frame.T_world_camera = truth_at(frame.timestamp);

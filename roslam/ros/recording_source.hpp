@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "roslam/common/export.hpp"
@@ -16,6 +17,7 @@
 #include "roslam/sensors/depth_registration.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/sensors/inertial_queue.hpp"
+#include "roslam/sensors/missing_depth.hpp"
 #include "roslam/sensors/stream_pairing.hpp"
 
 namespace roslam {
@@ -60,6 +62,7 @@ class ROSLAM_EXPORT RecordingSource : public FrameSource {
   bool is_realsense_ = false;
   std::optional<DepthRegistration> registration_;
   Pairing pairing_;
+  MissingDepth missing_depth_;
   bool is_at_end_ = false;
   InertialQueue inertial_;
   std::deque<StampedPose> truth_;      // of the camera

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "roslam/common/error.hpp"
+#include "roslam/ros/rvl.hpp"
 #include "roslam/sensors/image_file.hpp"
 
 namespace roslam {
@@ -73,7 +74,18 @@ cv::Mat raw_pixels(const RosImage& image, const Encoding& encoding) {
   return aligned;
 }
 
+// OpenCV would try all formats that it has been built with, some of which allocate what damaged bytes say.
+bool is_jpeg_or_png(std::span<const std::uint8_t> bytes) {
+  constexpr std::array<std::uint8_t, 3> kJpeg{0xff, 0xd8, 0xff};
+  constexpr std::array<std::uint8_t, 8> kPng{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  const auto begins_with = [&](const auto& mark) {
+    return bytes.size() > mark.size() && std::equal(mark.begin(), mark.end(), bytes.begin());
+  };
+  return begins_with(kJpeg) || begins_with(kPng);
+}
+
 cv::Mat decoded(std::span<const std::uint8_t> bytes, int flags) {
+  if (!is_jpeg_or_png(bytes)) throw InputError("compressed image is neither JPEG nor PNG");
   if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
     throw InputError("compressed image is too large");
   cv::Mat image;
@@ -87,16 +99,16 @@ cv::Mat decoded(std::span<const std::uint8_t> bytes, int flags) {
   return image;
 }
 
-// compressed_depth_image_transport puts the kind of image and two numbers before a PNG. For 32FC1 they say
-// how inverse depth was quantised: depth = first / (value - second).
+// compressed_depth_image_transport puts the kind of image and two numbers before a PNG or RVL. For 32FC1 they
+// say how inverse depth was quantised: depth = first / (value - second).
 cv::Mat compressed_depth(const RosImage& image, double units_per_metre, std::size_t* saturated) {
   constexpr std::size_t kHeader = 12;
   if (image.data.size() <= kHeader) throw InputError("compressedDepth image is truncated");
-  if (image.encoding.find("rvl") != std::string::npos)
-    throw InputError("compressedDepth image of the format RVL, which is not supported; record it as PNG");
   std::array<float, 2> quantisation{};
   std::memcpy(quantisation.data(), image.data.data() + 4, sizeof(quantisation));
-  const cv::Mat raw = decoded(image.data.subspan(kHeader), cv::IMREAD_UNCHANGED);
+  const auto bytes = image.data.subspan(kHeader);
+  const bool is_rvl = image.encoding.find("rvl") != std::string::npos;
+  const cv::Mat raw = is_rvl ? decode_rvl(bytes) : decoded(bytes, cv::IMREAD_UNCHANGED);
   if (raw.type() != CV_16UC1) throw InputError("compressedDepth image is not of 16 bits");
   if (!image.encoding.starts_with("32FC1")) return depth_to_metres(raw, units_per_metre, saturated);
   cv::Mat metres = cv::Mat::zeros(raw.size(), CV_32FC1);

@@ -23,8 +23,8 @@ PixelKind kind_of(const RosImage& image);
 cv::Mat colour_pixels(const RosImage& image);
 
 /// The pixels of a depth image as CV_32FC1 metres, 0 where unknown. 16 bit: units_per_metre; 32FC1: metres.
-/// compressedDepth: as PNG. saturated: if not null, receives the number of pixels at the end of the sensor's
-/// range. Throws likewise.
+/// compressedDepth: as PNG or RVL. saturated: if not null, receives the number of pixels at the end of the
+/// sensor's range. Throws likewise.
 cv::Mat depth_pixels(const RosImage& image, double units_per_metre, std::size_t* saturated = nullptr);
 
 }  // namespace roslam

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -10,6 +11,8 @@
 #include "roslam/geometry/se3.hpp"
 
 namespace roslam {
+
+class PixelDistortion;
 
 /// Depth registration: brings the depth image of one camera into the image of another. Two corners of each
 /// depth pixel are projected, and the pixels between them get its depth along the other's optical axis, so
@@ -33,22 +36,25 @@ class ROSLAM_EXPORT DepthRegistration {
   cv::Mat operator()(const cv::Mat& depth) const;
 
  private:
+  struct Rays;
   struct Row;
-  void project(const float* depth, int row, Row& projected) const;
+  void fill_table(const Camera& depth);
+  Rays corners(int row, std::vector<float>& memory) const;
   void measure_seams();
-  void distort(std::vector<float>& x, std::vector<float>& y) const;
-  void project_corners(const float* depth, std::size_t corners, Row& row) const;
+  void locate(const float* depth, const Rays& rays, std::vector<float>& x, std::vector<float>& y) const;
+  void project(const float* depth, int row, Row& projected) const;
 
   cv::Size from_, to_;
   bool is_identity_ = false;
-  bool has_distortion_ = false;
-  // Rays of the pixel corners, at depth 1, times the colour camera's matrix and the rotation: three planes of
-  // (height + 1) x (width + 1). A point at depth z projects to z * ray + offset_ (homogeneous).
-  std::vector<float> x_, y_, z_;
-  std::vector<float> centre_z_;  // of the pixel centres: depth in the colour camera for depth 1
+  // The ray of a pixel (u, v, 1) of the depth image, at depth 1, times the rotation and the colour camera's
+  // matrix. A point at depth z projects to z * ray + offset_ (homogeneous).
+  Eigen::Matrix3d ray_of_pixel_ = Eigen::Matrix3d::Zero();
   Eigen::Vector3f offset_ = Eigen::Vector3f::Zero();
+  // The same of the pixel corners of a depth camera with distortion, else empty: rows of height + 1, in each
+  // x, y and z of width + 1.
+  std::vector<float> table_;
   float seam_x_ = 0.0F, seam_y_ = 0.0F;  // pixels that rectangles are widened by, so that they leave no gaps
-  cv::Mat displacement_;  // CV_32FC2, of the raw from the undistorted pixel; empty without distortion
+  std::shared_ptr<const PixelDistortion> distortion_;  // of the colour camera; null if it has none
 };
 
 }  // namespace roslam

@@ -38,6 +38,7 @@ class StreamPairing {
   struct Pair {
     Image colour;
     std::optional<Image> depth;
+    std::optional<std::int64_t> nearest;  ///< ns to the nearest depth image, where none belongs to it
   };
 
   StreamPairing() = default;
@@ -53,25 +54,14 @@ class StreamPairing {
   /// more.
   std::optional<Pair> take(bool no_more = false) {
     if (!is_decided(no_more)) return std::nullopt;
-    Pair pair{std::move(colour_.images.front()), std::nullopt};
+    Pair pair{std::move(colour_.images.front()), std::nullopt, std::nullopt};
     colour_.images.pop_front();
     pair.depth = take_depth(pair.colour);
+    if (!pair.depth) pair.nearest = distance_to_depth(pair.colour);
     return pair;
   }
 
-  /// Both streams begin anew, such as when a camera has come back: images that wait are lost, and the next
-  /// ones are of a new segment.
-  void restart() {
-    const int segment = std::max(colour_.segment, depth_.segment) + 1;
-    for (Stream* stream : {&colour_, &depth_}) {
-      if (!stream->images.empty()) stream->skipped[kAlone] += stream->images.size();
-      stream->images.clear();
-      stream->last.reset();
-      stream->before.reset();
-      stream->candidate.reset();
-      stream->segment = segment;
-    }
-  }
+  const StreamPairingOptions& options() const { return options_; }
 
   /// Images that were left out, by reason in words.
   const std::map<std::string, std::size_t>& skipped_colour() const { return colour_.skipped; }
@@ -168,8 +158,10 @@ class StreamPairing {
   std::optional<Image> take_depth(const Image& colour) {
     auto& depths = depth_.images;
     while (!depths.empty() &&
-           order_of(depths.front()) < std::pair(colour.segment, colour.stamp - options_.half_interval))
+           order_of(depths.front()) < std::pair(colour.segment, colour.stamp - options_.half_interval)) {
+      passed_depth_ = order_of(depths.front());
       depths.pop_front();
+    }
     const auto is_near = [&](const Image& depth) {
       return depth.segment == colour.segment && distance(depth.stamp, colour.stamp) <= options_.half_interval;
     };
@@ -187,13 +179,27 @@ class StreamPairing {
         nearest = depths.end();
     }
     if (nearest == depths.end()) return std::nullopt;
+    passed_depth_ = order_of(*nearest);
     std::optional<Image> taken = std::move(*nearest);
     depths.erase(depths.begin(), std::next(nearest));
     return taken;
   }
 
+  std::optional<std::int64_t> distance_to_depth(const Image& colour) const {
+    std::optional<std::int64_t> nearest;
+    const auto offer = [&](const std::pair<int, std::int64_t>& depth) {
+      if (depth.first != colour.segment) return;
+      const std::int64_t apart = distance(depth.second, colour.stamp);
+      nearest = std::min(apart, nearest.value_or(apart));
+    };
+    if (passed_depth_) offer(*passed_depth_);
+    for (const Image& depth : depth_.images) offer(order_of(depth));
+    return nearest;
+  }
+
   StreamPairingOptions options_;
   Stream colour_, depth_;
+  std::optional<std::pair<int, std::int64_t>> passed_depth_;  // segment and stamp, taken or left behind
 };
 
 }  // namespace roslam
