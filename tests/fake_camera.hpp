@@ -94,7 +94,6 @@ inline CameraSample fake_image(CameraStream stream, std::uint64_t number, std::i
   sample.stamp = stamp;
   sample.clock = "Global Time";
   sample.number = number;
-  sample.received = std::chrono::steady_clock::now();
   sample.pixels = stream == CameraStream::kDepth
                       ? cv::Mat(camera.height, camera.width, CV_16UC1, cv::Scalar(value))
                       : cv::Mat(camera.height, camera.width, CV_8UC3, cv::Scalar::all(value));

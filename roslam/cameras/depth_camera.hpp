@@ -31,6 +31,12 @@ struct ROSLAM_EXPORT DepthCameraMode {
   bool operator==(const DepthCameraMode&) const = default;
 };
 
+/// "640x480 at 30 a second".
+inline std::string in_words(const DepthCameraMode& mode) {
+  return std::to_string(mode.width) + "x" + std::to_string(mode.height) + " at " + std::to_string(mode.fps) +
+         " a second";
+}
+
 /// As the device knows it.
 struct ROSLAM_EXPORT DepthCameraCalibration {
   Camera colour;  ///< with the depth units, the rate, and the inertial unit if it has one
@@ -43,10 +49,10 @@ enum class CameraStream { kColour, kDepth, kAccelerometer, kGyroscope };
 /// What a stream of a camera gives at one time.
 struct ROSLAM_EXPORT CameraSample {
   CameraStream stream = CameraStream::kColour;
-  std::int64_t stamp = 0;                          ///< ns, of the middle of the exposure where it is known
-  std::string clock;                               ///< that stamped it, as the camera calls it
-  std::uint64_t number = 0;                        ///< counts the images of a stream; 0: not known
-  std::chrono::steady_clock::time_point received;  ///< by this computer
+  std::int64_t stamp = 0;    ///< ns, of the middle of the exposure where it is known
+  std::string clock;         ///< that stamped it, as the camera calls it
+  std::uint64_t number = 0;  ///< counts the images of a stream; 0: not known
+  std::chrono::steady_clock::time_point received = std::chrono::steady_clock::now();  ///< by this computer
   cv::Mat pixels;  ///< CV_8UC3 (BGR) or CV_16UC1 (depth, in units of the camera)
   Eigen::Vector3d vector = Eigen::Vector3d::Zero();  ///< rad/s or m/s^2, in the frame of the inertial unit
 };
@@ -84,8 +90,8 @@ class ROSLAM_EXPORT DepthCamera {
   /// Waits for what the streams give, at most that long; nothing if nothing came. Throws CameraLost.
   virtual std::vector<CameraSample> wait(std::chrono::milliseconds at_most) = 0;
 
-  /// Makes the device start anew, as if it had been unplugged; it is back after some seconds. Throws
-  /// CameraLost if it is not there.
+  /// Makes the device start anew, as if it had been unplugged; it is back after some seconds. Does nothing if
+  /// it is not there. Throws CameraLost.
   virtual void reset(const std::string& serial) = 0;
 
   /// Stops the streams. Does nothing if it is not open.

@@ -2,6 +2,7 @@
 #include "roslam/cameras/live_source.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "roslam/ros/ros_messages.hpp"
@@ -24,6 +25,13 @@ bool is_image(const CameraSample& sample) {
 
 std::string name_of(const DepthCameraDevice& device) {
   return device.name + " (" + device.serial + (device.usb.empty() ? "" : ", USB " + device.usb) + ")";
+}
+
+// Of cameras of its kind.
+std::optional<DepthNoise> usual_noise(const DepthCameraDevice& device) {
+  for (const auto& [part, preset] : {std::pair("D43", "d435"), std::pair("D45", "d455")})
+    if (device.name.find(part) != std::string::npos) return camera_preset(preset)->depth_noise;
+  return std::nullopt;
 }
 
 void merge(const Counts& counts, Counts& to) {
@@ -109,6 +117,11 @@ void LiveSource::open_in(DepthCameraMode mode) {
   if (has_frame_ || registration_) return;  // it is the same camera
   calibration_ = std::move(calibration);
   calibration_.colour.fps = mode.fps;
+  double& units = calibration_.colour.depth_units_per_metre;
+  const double whole = std::round(units);
+  if (std::abs(units - whole) < 1e-4 * whole)
+    units = whole;  // a driver may have them as the inverse of a float
+  if (!calibration_.colour.depth_noise) calibration_.colour.depth_noise = usual_noise(device_);
   if (T_body_camera_) calibration_.colour.T_body_camera = *T_body_camera_;
   calibration_.colour.validate();
   registration_.emplace(calibration_.depth, calibration_.colour, calibration_.T_colour_depth);

@@ -4,15 +4,16 @@
 #include <atomic>
 #include <cmath>
 #include <librealsense2/rs.hpp>
+#include <tuple>
 #include <utility>
 
 namespace roslam {
 
 namespace {
-constexpr unsigned kQueue = 64;  // frames, of all streams
-constexpr int kAccelerometerRate = 200, kGyroscopeRate = 400;
+constexpr unsigned kQueue = 64;                                // frames, of all streams
+constexpr int kAccelerometerRate = 200, kGyroscopeRate = 400;  // Hz
 
-// Calls the SDK, whose errors mean that the device does not answer.
+// Calls the SDK; its errors mean that the device does not answer.
 template <typename Call>
 auto answer_of(const Call& call) {
   try {
@@ -24,42 +25,33 @@ auto answer_of(const Call& call) {
 
 SE3 transform_of(const rs2_extrinsics& extrinsics) {
   const Eigen::Matrix3f R = Eigen::Map<const Eigen::Matrix3f>(extrinsics.rotation);  // column by column
-  const Eigen::Vector3f t(extrinsics.translation[0], extrinsics.translation[1], extrinsics.translation[2]);
+  const Eigen::Vector3f t = Eigen::Map<const Eigen::Vector3f>(extrinsics.translation);
   return SE3(Eigen::Quaterniond(R.cast<double>()).normalized(), t.cast<double>());
 }
 
 // The SDK's projection applies the coefficients of the "inverse" model as those of Brown's.
 Camera camera_of(const rs2_intrinsics& intrinsics) {
   Camera camera;
-  camera.width = intrinsics.width;
-  camera.height = intrinsics.height;
-  camera.fx = intrinsics.fx;
-  camera.fy = intrinsics.fy;
-  camera.cx = intrinsics.ppx;
-  camera.cy = intrinsics.ppy;
+  std::tie(camera.width, camera.height) = std::tie(intrinsics.width, intrinsics.height);
+  std::tie(camera.fx, camera.fy) = std::tie(intrinsics.fx, intrinsics.fy);
+  std::tie(camera.cx, camera.cy) = std::tie(intrinsics.ppx, intrinsics.ppy);
   const float* k = intrinsics.coeffs;
-  if (intrinsics.model == RS2_DISTORTION_KANNALA_BRANDT4)
-    camera.set_lens("fisheye", {k[0], k[1], k[2], k[3]});
-  else if (intrinsics.model != RS2_DISTORTION_NONE)
-    camera.set_lens("pinhole", {k[0], k[1], k[2], k[3], k[4]});
+  const bool is_fisheye = intrinsics.model == RS2_DISTORTION_KANNALA_BRANDT4;
+  if (intrinsics.model != RS2_DISTORTION_NONE)
+    camera.set_lens(is_fisheye ? "fisheye" : "pinhole", std::vector<double>(k, k + (is_fisheye ? 4 : 5)));
   return camera;
 }
 
-void set(const rs2::sensor& sensor, rs2_option option, float value) {
-  try {
-    if (sensor.supports(option) && !sensor.is_option_read_only(option)) sensor.set_option(option, value);
-  } catch (const rs2::error&) {  // a setting that the camera refuses is no reason not to fly
-  }
-}
-
 // One clock for all streams, a constant rate in the dark, and no queue before ours.
-void prepare(const rs2::device& device) {
-  for (const rs2::sensor& sensor : device.query_sensors()) {
-    set(sensor, RS2_OPTION_GLOBAL_TIME_ENABLED, 1.0F);
-    set(sensor, RS2_OPTION_ENABLE_AUTO_EXPOSURE, 1.0F);
-    set(sensor, RS2_OPTION_AUTO_EXPOSURE_PRIORITY, 0.0F);
-    set(sensor, RS2_OPTION_FRAMES_QUEUE_SIZE, 2.0F);
-    if (sensor.is<rs2::depth_sensor>()) set(sensor, RS2_OPTION_EMITTER_ENABLED, 1.0F);
+void prepare(const rs2::sensor& sensor) {
+  for (const auto& [option, value] :
+       {std::pair(RS2_OPTION_GLOBAL_TIME_ENABLED, 1.0F), std::pair(RS2_OPTION_ENABLE_AUTO_EXPOSURE, 1.0F),
+        std::pair(RS2_OPTION_AUTO_EXPOSURE_PRIORITY, 0.0F), std::pair(RS2_OPTION_FRAMES_QUEUE_SIZE, 2.0F),
+        std::pair(RS2_OPTION_EMITTER_ENABLED, 1.0F)}) {
+    try {
+      if (sensor.supports(option) && !sensor.is_option_read_only(option)) sensor.set_option(option, value);
+    } catch (const rs2::error&) {  // a setting that the camera refuses is no reason not to fly
+    }
   }
 }
 
@@ -69,15 +61,12 @@ std::string text_of(const rs2::device& device, rs2_camera_info info) {
 
 // Nanoseconds. A frame is stamped when it is read out; where the metadata tell, the middle of its exposure.
 std::int64_t stamp_of(const rs2::frame& frame) {
-  std::int64_t stamp = std::llround(frame.get_timestamp() * 1e6);
-  if (frame.supports_frame_metadata(RS2_FRAME_METADATA_SENSOR_TIMESTAMP) &&
-      frame.supports_frame_metadata(RS2_FRAME_METADATA_FRAME_TIMESTAMP)) {
-    const auto later = frame.get_frame_metadata(RS2_FRAME_METADATA_FRAME_TIMESTAMP) -
-                       frame.get_frame_metadata(RS2_FRAME_METADATA_SENSOR_TIMESTAMP);
-    constexpr rs2_metadata_type kLongest = 100000;  // microseconds
-    if (later > 0 && later < kLongest) stamp -= 1000 * later;
-  }
-  return stamp;
+  const std::int64_t stamp = std::llround(frame.get_timestamp() * 1e6);
+  const auto read_out = RS2_FRAME_METADATA_FRAME_TIMESTAMP, middle = RS2_FRAME_METADATA_SENSOR_TIMESTAMP;
+  if (!frame.supports_frame_metadata(read_out) || !frame.supports_frame_metadata(middle)) return stamp;
+  const auto later = frame.get_frame_metadata(read_out) - frame.get_frame_metadata(middle);
+  constexpr rs2_metadata_type kLongest = 100000;  // microseconds
+  return later > 0 && later < kLongest ? stamp - 1000 * later : stamp;
 }
 
 CameraSample sample_of(const rs2::frame& frame) {
@@ -85,22 +74,20 @@ CameraSample sample_of(const rs2::frame& frame) {
   sample.stamp = stamp_of(frame);
   sample.clock = rs2_timestamp_domain_to_string(frame.get_frame_timestamp_domain());
   sample.number = frame.get_frame_number();
-  sample.received = std::chrono::steady_clock::now();
   const rs2_stream stream = frame.get_profile().stream_type();
   if (const auto motion = frame.as<rs2::motion_frame>()) {
     const rs2_vector data = motion.get_motion_data();
     sample.stream = stream == RS2_STREAM_GYRO ? CameraStream::kGyroscope : CameraStream::kAccelerometer;
-    sample.vector = Eigen::Vector3d(data.x, data.y, data.z);
+    sample.vector = {data.x, data.y, data.z};
     return sample;
   }
   const rs2::video_frame image(frame);
   const bool is_depth = stream == RS2_STREAM_DEPTH;
   sample.stream = is_depth ? CameraStream::kDepth : CameraStream::kColour;
-  // A copy, as the SDK uses the memory again.
-  sample.pixels =
-      cv::Mat(image.get_height(), image.get_width(), is_depth ? CV_16UC1 : CV_8UC3,
-              const_cast<void*>(image.get_data()), static_cast<std::size_t>(image.get_stride_in_bytes()))
-          .clone();
+  const cv::Mat pixels(image.get_height(), image.get_width(), is_depth ? CV_16UC1 : CV_8UC3,
+                       const_cast<void*>(image.get_data()),
+                       static_cast<std::size_t>(image.get_stride_in_bytes()));
+  sample.pixels = pixels.clone();  // as the SDK uses the memory again
   return sample;
 }
 
@@ -112,39 +99,30 @@ class RealsenseCamera : public DepthCamera {
   std::vector<DepthCameraDevice> devices() override {
     return answer_of([&] {
       std::vector<DepthCameraDevice> found;
-      for (const rs2::device& device : context_.query_devices())
-        found.push_back({text_of(device, RS2_CAMERA_INFO_NAME),
-                         text_of(device, RS2_CAMERA_INFO_SERIAL_NUMBER),
-                         text_of(device, RS2_CAMERA_INFO_FIRMWARE_VERSION),
-                         text_of(device, RS2_CAMERA_INFO_USB_TYPE_DESCRIPTOR)});
+      for (const rs2::device& one : context_.query_devices())
+        found.push_back({text_of(one, RS2_CAMERA_INFO_NAME), text_of(one, RS2_CAMERA_INFO_SERIAL_NUMBER),
+                         text_of(one, RS2_CAMERA_INFO_FIRMWARE_VERSION),
+                         text_of(one, RS2_CAMERA_INFO_USB_TYPE_DESCRIPTOR)});
       return found;
     });
   }
 
   void open(const std::string& serial, const DepthCameraMode& mode) override {
     answer_of([&] {
-      rs2::config config;
-      config.enable_device(serial);
-      config.enable_stream(RS2_STREAM_COLOR, mode.width, mode.height, RS2_FORMAT_BGR8, mode.fps);
-      config.enable_stream(RS2_STREAM_DEPTH, mode.width, mode.height, RS2_FORMAT_Z16, mode.fps);
       pipeline_ = rs2::pipeline(context_);
+      rs2::config config = config_of(serial, mode, true);
+      has_inertial_ = config.can_resolve(*pipeline_);
+      if (!has_inertial_) config = config_of(serial, mode, false);
       if (!config.can_resolve(*pipeline_))
-        throw InputError("realsense:" + serial + ": has no images of " + std::to_string(mode.width) + "x" +
-                         std::to_string(mode.height) + " at " + std::to_string(mode.fps) +
-                         " a second; try another size, or a USB 3 cable");
-      rs2::config with_inertial = config;
-      with_inertial.enable_stream(RS2_STREAM_ACCEL, RS2_FORMAT_MOTION_XYZ32F, kAccelerometerRate);
-      with_inertial.enable_stream(RS2_STREAM_GYRO, RS2_FORMAT_MOTION_XYZ32F, kGyroscopeRate);
-      const bool has_inertial = with_inertial.can_resolve(*pipeline_);
+        throw InputError("realsense:" + serial + ": has no images of " + in_words(mode));
       const rs2::device device = config.resolve(*pipeline_).get_device();
-      prepare(device);
+      for (const rs2::sensor& sensor : device.query_sensors()) prepare(sensor);
       is_removed_ = false;
       context_.set_devices_changed_callback([this, device](const rs2::event_information& event) {
         if (event.was_removed(device)) is_removed_ = true;
       });
       queue_ = rs2::frame_queue(kQueue);
-      profile_ = pipeline_->start(has_inertial ? with_inertial : config, queue_);
-      has_inertial_ = has_inertial;
+      profile_ = pipeline_->start(config, queue_);
     });
   }
 
@@ -155,13 +133,11 @@ class RealsenseCamera : public DepthCamera {
       DepthCameraCalibration calibration{camera_of(colour.get_intrinsics()),
                                          camera_of(depth.get_intrinsics()),
                                          transform_of(depth.get_extrinsics_to(colour))};
-      const double scale = profile_.get_device().first<rs2::depth_sensor>().get_depth_scale();
-      const double units = 1.0 / scale, whole = std::round(units);  // metres of a unit, as a float
-      calibration.colour.depth_units_per_metre = std::abs(units - whole) < 1e-4 * whole ? whole : units;
-      if (!has_inertial_) return calibration;
-      calibration.colour.imu = ImuCalibration{};
-      calibration.colour.imu->T_camera_imu =
-          transform_of(profile_.get_stream(RS2_STREAM_GYRO).get_extrinsics_to(colour));
+      calibration.colour.depth_units_per_metre =
+          1.0 / profile_.get_device().first<rs2::depth_sensor>().get_depth_scale();
+      if (has_inertial_)
+        calibration.colour.imu.emplace().T_camera_imu =
+            transform_of(profile_.get_stream(RS2_STREAM_GYRO).get_extrinsics_to(colour));
       return calibration;
     });
   }
@@ -184,8 +160,7 @@ class RealsenseCamera : public DepthCamera {
   void reset(const std::string& serial) override {
     answer_of([&] {
       for (rs2::device device : context_.query_devices())
-        if (text_of(device, RS2_CAMERA_INFO_SERIAL_NUMBER) == serial) return device.hardware_reset();
-      throw CameraLost("RealSense: " + serial + " is not connected");
+        if (text_of(device, RS2_CAMERA_INFO_SERIAL_NUMBER) == serial) device.hardware_reset();
     });
   }
 
@@ -198,6 +173,17 @@ class RealsenseCamera : public DepthCamera {
   }
 
  private:
+  static rs2::config config_of(const std::string& serial, const DepthCameraMode& mode, bool has_inertial) {
+    rs2::config config;
+    config.enable_device(serial);
+    config.enable_stream(RS2_STREAM_COLOR, mode.width, mode.height, RS2_FORMAT_BGR8, mode.fps);
+    config.enable_stream(RS2_STREAM_DEPTH, mode.width, mode.height, RS2_FORMAT_Z16, mode.fps);
+    if (!has_inertial) return config;
+    config.enable_stream(RS2_STREAM_ACCEL, RS2_FORMAT_MOTION_XYZ32F, kAccelerometerRate);
+    config.enable_stream(RS2_STREAM_GYRO, RS2_FORMAT_MOTION_XYZ32F, kGyroscopeRate);
+    return config;
+  }
+
   rs2::context context_;
   std::optional<rs2::pipeline> pipeline_;
   rs2::pipeline_profile profile_;
@@ -209,8 +195,6 @@ class RealsenseCamera : public DepthCamera {
 
 bool has_realsense() { return true; }
 
-std::unique_ptr<DepthCamera> realsense_camera() {
-  return answer_of([] { return std::make_unique<RealsenseCamera>(); });
-}
+std::unique_ptr<DepthCamera> realsense_camera() { return answer_of(std::make_unique<RealsenseCamera>); }
 
 }  // namespace roslam
