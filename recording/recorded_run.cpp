@@ -55,6 +55,22 @@ Trajectory trajectory_of(const fs::path& file) {
 }
 }  // namespace
 
+RunSource source_of_run(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_regular_file(folder / "run.json", error)) {
+    throw InputError((folder / "run.json").string() +
+                     ": no such file; give the folder that roslam run wrote with --out");
+  }
+  RunSource source;
+  read_report(folder, [&](const Json& json) {
+    json.at("source").get_to(source.name);
+    if (json.contains("flight")) json["flight"].get_to(source.flight);
+    source.camera = camera_from(json.at("camera"));
+    source.is_whole = json.value("finished", true) && !json.value("interrupted", false);
+  });
+  return source;
+}
+
 Camera camera_of_run(const fs::path& folder) {
   Camera camera;
   read_report(folder, [&](const Json& json) { camera = camera_from(json.at("camera")); });
@@ -70,13 +86,8 @@ bool RecordedRun::recognises(const fs::path& folder) {
 RecordedRun::RecordedRun(const fs::path& folder)
     : removal_(folder),
       trajectory_(trajectory_of(folder / "trajectory.txt")),
-      keyframes_(trajectory_of(folder / "keyframes.txt")) {
-  read_report(folder, [&](const Json& json) {
-    json.at("source").get_to(source_);
-    if (json.contains("flight")) json["flight"].get_to(flight_);
-    camera_ = camera_from(json.at("camera"));
-  });
-}
+      keyframes_(trajectory_of(folder / "keyframes.txt")),
+      source_(source_of_run(folder)) {}
 
 std::optional<SE3> RecordedRun::pose_at(double timestamp) const {
   const auto later =

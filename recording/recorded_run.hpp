@@ -12,6 +12,17 @@
 
 namespace roslam::recording {
 
+/// What a run was made from, by its run.json.
+struct RunSource {
+  std::string name;                           ///< as the user named it
+  std::map<std::string, std::string> flight;  ///< as RunDescription::flight
+  Camera camera;
+  bool is_whole = true;  ///< the run came to the end of the source
+};
+
+/// Also of a run that was killed. Throws InputError naming the file that is missing or damaged.
+RunSource source_of_run(const std::filesystem::path& folder);
+
 /// The camera of a run, by its run.json. Throws InputError naming the file that is missing or damaged.
 Camera camera_of_run(const std::filesystem::path& folder);
 
@@ -24,10 +35,8 @@ class RecordedRun {
   /// Whether the folder has the files of a run.
   static bool recognises(const std::filesystem::path& folder);
 
-  const std::string& source() const { return source_; }  ///< as the user named it
-  /// As RunDescription::flight.
-  const std::map<std::string, std::string>& flight() const { return flight_; }
-  const Camera& camera() const { return camera_; }
+  const RunSource& source() const { return source_; }
+  const Camera& camera() const { return source_.camera; }
   const RecordedRemoval& removal() const { return removal_; }
   const Trajectory& trajectory() const { return trajectory_; }
   const Trajectory& keyframes() const { return keyframes_; }
@@ -37,11 +46,9 @@ class RecordedRun {
 
  private:
   RecordedRemoval removal_;
-  std::string source_;
-  std::map<std::string, std::string> flight_;
-  Camera camera_;
   Trajectory trajectory_;
   Trajectory keyframes_;
+  RunSource source_;
 };
 
 }  // namespace roslam::recording

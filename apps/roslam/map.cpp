@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/roslam/export_dense.hpp"
+#include "apps/roslam/export/export_dense.hpp"
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/named_path.hpp"
 #include "apps/roslam/support/output.hpp"
@@ -286,7 +286,7 @@ Occupied cells of an OctoMap come from the points of the dense map, free cells f
 Coordinates are those of the map, in metres.
 Exit code: 0 success, 1 an error in the input, 2 wrong usage.)";
 
-void add_export_command(CLI::App& map) {
+void add_map_export_command(CLI::App& map) {
   const auto arguments = std::make_shared<ExportArguments>();
   DenseExport& dense = arguments->dense;
   CLI::App* command = map.add_subcommand("export", "Export a map to PLY, PCD, OctoMap and TUM files");
@@ -328,7 +328,7 @@ void add_map_command(CLI::App& program) {
   map->require_subcommand(1);
   add_map_info_command(*map);
   add_merge_command(*map);
-  add_export_command(*map);
+  add_map_export_command(*map);
 }
 
 }  // namespace roslam::app

@@ -15,6 +15,7 @@
 #include "apps/roslam/support/output.hpp"
 #include "apps/roslam/support/progress.hpp"
 #include "apps/roslam/support/restored_folder.hpp"
+#include "apps/roslam/support/run_source.hpp"
 #include "apps/roslam/support/sources.hpp"
 #include "evaluation/plots/markdown_table.hpp"
 #include "evaluation/statistics.hpp"
@@ -23,12 +24,9 @@
 #include "roslam/common/error.hpp"
 #include "roslam/common/stopwatch.hpp"
 #include "roslam/common/write_file.hpp"
-#include "roslam/datasets/dataset.hpp"
 #include "roslam/datasets/folder_source.hpp"
 #include "roslam/datasets/tum_source.hpp"
 #include "roslam/options/settings.hpp"
-#include "roslam/ros/recording_source.hpp"
-#include "simulation/simulated_source.hpp"
 
 namespace roslam::app {
 
@@ -48,26 +46,6 @@ struct RestoreArguments {
   std::size_t every = 1;  // every so many-th frame is restored
   bool json = false;
 };
-
-// The source that a run was made from, from its first frame.
-std::unique_ptr<FrameSource> open_source_of(const RecordedRun& run) {
-  const bool is_simulated = run.source().starts_with("simulated:");
-  std::error_code error;
-  if (is_simulated ? run.flight().empty() : !fs::exists(run.source(), error)) {
-    throw InputError(
-        "the run is of " + run.source() +
-        (is_simulated ? ", but an earlier version did not record the options of the flight; repeat the run"
-                      : ", which is not there; run roslam restore in the folder that roslam run was run in"));
-  }
-  if (is_simulated)
-    return std::make_unique<SimulatedSource>(
-        *simulated_flight(flight_from_words(run.source(), run.flight())));
-  if (is_recorded(run.source()))
-    return std::make_unique<RecordingSource>(
-        run.source(), flight_from_words(run.source(), run.flight()).topics, run.camera());
-  if (is_other_dataset(run.source())) return open_dataset(run.source(), run.camera());
-  return std::make_unique<TumSource>(run.source(), run.camera());
-}
 
 std::string name_of_files(const FrameSource& source, const Frame& frame) {
   if (const auto* folder = dynamic_cast<const TumSource*>(&source))
@@ -150,7 +128,7 @@ Json report_of(const RestoreArguments& arguments, const RecordedRun& run, const 
   const auto share = [&](std::size_t pixels) {
     return hole > 0.0 ? Json(static_cast<double>(pixels) / hole) : Json(nullptr);
   };
-  return {{"source", run.source()},
+  return {{"source", run.source().name},
           {"out", arguments.out.string()},
           {"method", arguments.method.empty() ? "both" : arguments.method},
           {"network", has_network},
@@ -189,9 +167,9 @@ void restore(RestoreArguments arguments, const std::string& version) {
   RestoredFolder::require_usable(arguments.out);
   RestoredFolder::require_apart(arguments.out, arguments.flight.source.name);
   const RecordedRun run(run_folder_of(arguments, version, stop));
-  RestoredFolder::require_apart(arguments.out, run.source());
+  RestoredFolder::require_apart(arguments.out, run.source().name);
   const auto settings = settings_for(arguments, run);
-  const auto first_pass = open_source_of(run);  // reports its errors before anything else is done
+  const auto first_pass = open_source_of(run.source());  // reports its errors before anything else is done
   const auto inpainter = inpainter_for(arguments, settings.restoration);
   StaticSceneRestorer restorer(run.camera(), settings, inpainter);
   SequenceRestorer sequence(run, restorer);
@@ -201,12 +179,12 @@ void restore(RestoreArguments arguments, const std::string& version) {
     return;
   }
   RestoredFolder folder(arguments.out, run.camera());
-  const Restored restored = restore_all(sequence, *open_source_of(run), folder, arguments, stop);
+  const Restored restored = restore_all(sequence, *open_source_of(run.source()), folder, arguments, stop);
   const Json report = report_of(arguments, run, folder, restored, sequence.sources(), inpainter != nullptr,
                                 stop.stop_requested());
   folder.close(report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   if (folder.frames() == 0 && !stop.stop_requested())
-    throw InputError(run.source() + ": no frame could be restored" + in_words(restored.left_out) +
+    throw InputError(run.source().name + ": no frame could be restored" + in_words(restored.left_out) +
                      "; is it the source of the run?");
   if (arguments.json) {
     std::cout << report.dump(-1, ' ', false, Json::error_handler_t::replace) << "\n";

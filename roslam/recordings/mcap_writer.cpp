@@ -66,7 +66,8 @@ void McapWriter::fail() const {
   throw OutputError(file_.path().string() + ": cannot be written; is the disk full?");
 }
 
-int McapWriter::add_topic(const std::string& name, const std::string& type, const std::string& definition) {
+int McapWriter::add_topic(const std::string& name, const std::string& type, const std::string& definition,
+                          const std::map<std::string, std::string>& metadata) {
   const std::size_t id = topics_.size();
   if (id >= std::numeric_limits<std::uint16_t>::max()) throw UsageError("too many topics for an MCAP file");
   const auto [schema, is_new] = schemas_.try_emplace(type, static_cast<std::uint16_t>(schemas_.size() + 1));
@@ -84,7 +85,12 @@ int McapWriter::add_topic(const std::string& name, const std::string& type, cons
     out.put(schema->second);
     out.put_text(name);
     out.put_text("cdr");
-    out.put(std::uint32_t{0});  // bytes of metadata
+    BinaryWriter pairs;
+    for (const auto& [key, value] : metadata) {
+      pairs.put_text(key);
+      pairs.put_text(value);
+    }
+    out.put_text(pairs.bytes());
   });
   topics_.push_back(std::move(topic));
   return static_cast<int>(id);

@@ -36,8 +36,10 @@ class ROSLAM_EXPORT McapWriter {
   McapWriter& operator=(const McapWriter&) = delete;
 
   /// Describes a topic; returns its id. type: such as sensor_msgs/msg/Image; definition: as ros_definition()
-  /// gives it. Throws UsageError for more than 65535 topics.
-  int add_topic(const std::string& name, const std::string& type, const std::string& definition);
+  /// gives it; metadata: of the channel, such as offered_qos_profiles of rosbag2. Throws UsageError for more
+  /// than 65535 topics.
+  int add_topic(const std::string& name, const std::string& type, const std::string& definition,
+                const std::map<std::string, std::string>& metadata = {});
 
   /// Appends a message in CDR. time: nanoseconds from 0, when it was recorded. Throws OutputError if the disk
   /// is full or fails; what was written before stays readable, and the message is lost. Throws UsageError for

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "apps/roslam/export_dense.hpp"
+#include "apps/roslam/export/export_dense.hpp"
 
 #include <array>
 #include <cstdio>
