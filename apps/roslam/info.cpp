@@ -130,6 +130,7 @@ void print(const Recording& recording, const RecordingContents& contents, const 
             << (streams.T_colour_depth ? ", to be registered to colour" : ", as registered to colour");
   if (streams.camera.depth_units_per_metre > 0.0)
     std::cout << ", " << words("%.6g units a metre", streams.camera.depth_units_per_metre, 0, 0, 0);
+  if (contents.camera) std::cout << "\n  camera    " << kCameraTopic << ", with mount and noise";
   std::cout << "\n  inertial  ";
   for (const RecordedTopic& topic : streams.inertial) std::cout << topic.name << " ";
   std::cout << (streams.inertial.empty() ? "none" : "") << "\n  truth     "
