@@ -37,6 +37,9 @@ set(ROSLAM_PUBLIC_HEADERS
   cameras/depth_camera.hpp
   cameras/exposure_settling.hpp
   cameras/live_source.hpp
+  cameras/live_source_options.hpp
+  cameras/realsense_camera.hpp
+  cameras/camera_recorder.hpp
   datasets/dataset.hpp
   datasets/folder_source.hpp
   features/descriptor.hpp

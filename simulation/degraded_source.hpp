@@ -37,6 +37,7 @@ class DegradedSource : public FrameSource {
 
   std::optional<Frame> next() override;
   void interrupt() override { source_->interrupt(); }
+  bool is_live() const override { return source_->is_live(); }
   const Camera& camera() const override { return source_->camera(); }
   std::optional<std::size_t> size() const override;
   std::map<std::string, std::size_t> skipped() const override { return source_->skipped(); }

@@ -158,8 +158,8 @@ TEST(CameraRecorder, TellsThatTheDiskIsFullAndKeepsWhatWasWritten) {
     const FileSizeLimit full(200000);
     CameraRecorderOptions options;
     options.waits_for_disk = true;
-    options.file.chunk_bytes = 20000;
-    options.file.compression = Compression::kNone;
+    options.chunk_bytes = 20000;
+    options.compresses = false;
     CameraRecorder recorder(file, calibration, options);
     for (std::uint64_t i = 1; i <= 100; ++i)
       recorder.add(fake_image(CameraStream::kColour, i, static_cast<std::int64_t>(i) * 33'333'333, 100));

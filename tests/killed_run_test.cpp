@@ -11,9 +11,9 @@
 #include <sstream>
 #include <thread>
 
-#include "roslam/common/appended_file.hpp"
 #include "recording/flight_log.hpp"
 #include "recording/odometry_file.hpp"
+#include "roslam/common/appended_file.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/dense/surface_file.hpp"
 #include "roslam/map_io/map_file.hpp"

@@ -5,6 +5,7 @@
 #include <array>
 #include <utility>
 
+#include "roslam/recordings/mcap_writer.hpp"
 #include "roslam/ros/recording_contents.hpp"
 #include "roslam/ros/ros_definitions.hpp"
 #include "roslam/ros/ros_encoding.hpp"
@@ -53,6 +54,15 @@ constexpr std::array<TopicName, 12> kTopics{{
     {"/ground_truth/pose", "geometry_msgs/msg/PoseStamped"},
 }};
 
+constexpr std::chrono::seconds kFlush{1};  // what is written is brought to the disk as often
+
+McapWriterOptions writer_options(const CameraRecorderOptions& options) {
+  McapWriterOptions writing;
+  writing.chunk_bytes = options.chunk_bytes;
+  if (!options.compresses) writing.compression = Compression::kNone;
+  return writing;
+}
+
 RosImu imu_of(const CameraSample& sample) {
   RosImu imu;
   imu.header = {sample.stamp, kInertialFrame};
@@ -69,14 +79,14 @@ CameraRecorder::CameraRecorder(const std::filesystem::path& file, const DepthCam
                       std::chrono::system_clock::now().time_since_epoch())
                       .count()),
       steady_start_(std::chrono::steady_clock::now()),
-      writer_(file, options.file),
-      bytes_(writer_.bytes()),
+      writer_(std::make_unique<McapWriter>(file, writer_options(options))),
+      bytes_(writer_->bytes()),
       thread_([this](const std::stop_token& stop) { write_waiting(stop); }) {}
 
 CameraRecorder::~CameraRecorder() {
   try {
     close();
-  } catch (const Error&) {  // the caller did not ask
+  } catch (const std::exception&) {  // the caller did not ask
   }
 }
 
@@ -91,7 +101,7 @@ std::vector<CameraRecorder::Message> CameraRecorder::described(std::int64_t time
   return messages;
 }
 
-void CameraRecorder::add(const CameraSample& sample) {
+std::vector<CameraRecorder::Message> CameraRecorder::messages_of(const CameraSample& sample) const {
   const auto since_start =
       std::chrono::duration_cast<std::chrono::nanoseconds>(sample.received - steady_start_);
   const std::int64_t time = wall_start_ + since_start.count();
@@ -116,10 +126,19 @@ void CameraRecorder::add(const CameraSample& sample) {
       messages.push_back({Topic::kGyroscope, time, encode_imu(imu_of(sample))});
       break;
   }
-  put(std::move(messages));
+  return messages;
 }
 
-void CameraRecorder::add(const Frame& frame) {
+void CameraRecorder::add(const CameraSample& sample) {
+  try {
+    put(messages_of(sample));
+  } catch (const InputError&) {  // pixels of a type that has no name
+    const std::scoped_lock lock(mutex_);
+    ++lost_;
+  }
+}
+
+void CameraRecorder::add(const Frame& frame, const std::stop_token& stop) {
   std::vector<Message> messages;
   for (const InertialSample& sample : frame.inertial) {
     const std::int64_t stamp = nanoseconds_of(sample.timestamp);
@@ -138,7 +157,7 @@ void CameraRecorder::add(const Frame& frame) {
     messages.push_back({Topic::kRegisteredDepth, time, encode_image(header, frame.depth)});
     messages.push_back({Topic::kRegisteredDepthInfo, time, info});
   }
-  put(std::move(messages));
+  put(std::move(messages), stop);
 }
 
 // Readers go by the time of the recording: it must not go back where the clock of a source does.
@@ -149,15 +168,16 @@ std::int64_t CameraRecorder::next_time(std::int64_t time) {
   return *last_time_;
 }
 
-void CameraRecorder::put(std::vector<Message> messages) {
+void CameraRecorder::put(std::vector<Message> messages, const std::stop_token& stop) {
   std::size_t bytes = 0;
   for (const Message& message : messages) bytes += message.content.size();
   std::unique_lock lock(mutex_);
   const auto has_room = [&] {
-    return waiting_.empty() || waiting_bytes_ + bytes <= options_.waiting_bytes || !failure_.empty();
+    return waiting_.empty() || waiting_bytes_ + bytes <= options_.waiting_bytes || !failure_.empty() ||
+           is_closed_;
   };
-  if (options_.waits_for_disk) changed_.wait(lock, has_room);
-  if (!failure_.empty()) return;
+  if (options_.waits_for_disk) changed_.wait(lock, stop, has_room);
+  if (!failure_.empty() || is_closed_) return;
   if (!has_room()) {
     lost_ += messages.size();
     return;
@@ -174,22 +194,34 @@ void CameraRecorder::put(std::vector<Message> messages) {
 }
 
 void CameraRecorder::write_waiting(const std::stop_token& stop) {
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point flushed = Clock::now();
+  bool is_flushed = true;
   std::unique_lock lock(mutex_);
   while (true) {
-    changed_.wait(lock, stop, [&] { return !waiting_.empty(); });
-    if (waiting_.empty()) return;  // stopped, and all is written
-    const Message message = std::move(waiting_.front());
-    waiting_.pop_front();
+    changed_.wait_for(lock, stop, kFlush, [&] { return !waiting_.empty(); });
+    if (waiting_.empty() && stop.stop_requested()) return;  // all is written
+    std::optional<Message> message;
+    if (!waiting_.empty()) {
+      message = std::move(waiting_.front());
+      waiting_.pop_front();
+    }
     lock.unlock();
     std::string failure;
     try {
-      write(message);
-    } catch (const Error& error) {
+      if (message) write(*message);
+      is_flushed &= !message;
+      if (!is_flushed && Clock::now() - flushed >= kFlush) {
+        writer_->flush();
+        flushed = Clock::now();
+        is_flushed = true;
+      }
+    } catch (const std::exception& error) {
       failure = error.what();
     }
     lock.lock();
-    waiting_bytes_ -= std::min(waiting_bytes_, message.content.size());
-    bytes_ = writer_.bytes();
+    if (message) waiting_bytes_ -= std::min(waiting_bytes_, message->content.size());
+    bytes_ = writer_->bytes();
     if (!failure.empty()) {
       failure_ = failure;
       waiting_.clear();
@@ -203,21 +235,22 @@ void CameraRecorder::write(const Message& message) {
   const auto [id, is_new] = ids_.try_emplace(message.topic, -1);
   if (is_new) {
     const TopicName& topic = kTopics[static_cast<std::size_t>(message.topic)];
-    id->second = writer_.add_topic(topic.name, topic.type, ros_definition(topic.type));
+    id->second = writer_->add_topic(topic.name, topic.type, ros_definition(topic.type));
   }
-  writer_.write(id->second, message.time, message.content);
+  writer_->write(id->second, message.time, message.content);
 }
 
 void CameraRecorder::close() {
   if (!thread_.joinable()) return;
+  {
+    const std::scoped_lock lock(mutex_);
+    is_closed_ = true;
+  }
   thread_.request_stop();
   thread_.join();
-  if (failure_.empty()) {
-    writer_.close();
-    bytes_ = writer_.bytes();
-  } else {
-    throw OutputError(failure_);
-  }
+  if (!failure_.empty()) throw OutputError(failure_);
+  writer_->close();
+  bytes_ = writer_->bytes();
 }
 
 std::size_t CameraRecorder::lost() const {

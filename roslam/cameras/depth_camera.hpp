@@ -23,6 +23,11 @@ struct ROSLAM_EXPORT DepthCameraDevice {
   bool is_usb2() const { return usb.starts_with("2"); }
 };
 
+/// "Intel RealSense D435 (1234, USB 3.2)".
+inline std::string in_words(const DepthCameraDevice& device) {
+  return device.name + " (" + device.serial + (device.usb.empty() ? "" : ", USB " + device.usb) + ")";
+}
+
 /// The images that are asked for; of colour and depth alike.
 struct ROSLAM_EXPORT DepthCameraMode {
   int width = 640, height = 480;  ///< pixels

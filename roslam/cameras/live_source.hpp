@@ -2,16 +2,17 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
+#include <deque>
 #include <functional>
+#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "roslam/cameras/depth_camera.hpp"
 #include "roslam/cameras/exposure_settling.hpp"
+#include "roslam/cameras/live_source_options.hpp"
 #include "roslam/common/export.hpp"
 #include "roslam/sensors/counts.hpp"
 #include "roslam/sensors/depth_registration.hpp"
@@ -22,19 +23,7 @@
 
 namespace roslam {
 
-struct ROSLAM_EXPORT LiveSourceOptions {
-  std::string serial;    ///< of the camera; empty: the only one that is connected
-  DepthCameraMode mode;  ///< that is asked for; by USB 2 at most 15 images a second
-  std::chrono::milliseconds silence{
-      3000};  ///< without any image, after which the camera counts as lost; >= 100
-  std::chrono::milliseconds retry{1000};  ///< between two attempts to open a camera that was lost; >= 1
-  int attempts_before_reset = 3;          ///< that fail, after which the hardware is reset; >= 1
-  std::chrono::milliseconds first_image{
-      20000};  ///< to wait for the first image of all, then to give up; >= 100
-
-  /// Throws OptionsError.
-  void validate() const;
-};
+class CameraConnection;
 
 /// Frames of a camera that is connected. Colour and depth images are paired by their time stamps, within half
 /// a frame, and depth is registered to colour. A camera that is lost is opened again by its serial number,
@@ -45,72 +34,62 @@ struct ROSLAM_EXPORT LiveSourceOptions {
 class ROSLAM_EXPORT LiveSource : public FrameSource {
  public:
   /// Opens the camera. T_body_camera: the mount. Throws InputError if there is no camera, or several and no
-  /// serial number, or it does not start.
+  /// serial number, or it does not start; CalibrationError if its calibration cannot be.
   LiveSource(std::unique_ptr<DepthCamera> camera, const LiveSourceOptions& options,
              const std::optional<SE3>& T_body_camera = {});
   ~LiveSource() override;
 
-  /// Calls a function with each sample that is used, on the thread of next(), such as to record it. To be set
-  /// before the first next().
+  /// Calls a function with each sample that is used, on the thread of next(), such as to record it. What it
+  /// uses must outlive the source, or be taken away by an empty function. Not while next() runs.
   void on_sample(std::function<void(const CameraSample&)> function) { on_sample_ = std::move(function); }
 
-  /// Also throws InputError if no image comes at all, or colour and depth are stamped by different clocks.
+  /// Also throws InputError if no colour or no depth image comes at all, or the two are stamped by different
+  /// clocks.
   std::optional<Frame> next() override;
   using FrameSource::next;
   void interrupt() override;
   bool is_live() const override { return true; }
   const Camera& camera() const override { return calibration_.colour; }
 
-  std::map<std::string, std::size_t> skipped() const override;
-  std::map<std::string, std::size_t> skipped_depth() const override;
-  std::map<std::string, std::size_t> notes() const override { return notes_; }
+  Counts skipped() const override;
+  Counts skipped_depth() const override;
+  Counts notes() const override;
 
-  const DepthCameraDevice& device() const { return device_; }
+  const DepthCameraDevice& device() const;
   const DepthCameraCalibration& calibration() const { return calibration_; }
 
  private:
   using Clock = std::chrono::steady_clock;
   using Pairing = StreamPairing<CameraSample>;
 
-  DepthCameraDevice find_device() const;
-  void open();
-  void open_in(DepthCameraMode mode);
-  void lose(const std::string& why);
-  void come_back();
-  void require_images() const;
-  bool pause(std::chrono::milliseconds duration);
-  bool take_interrupt();
+  void begin_opening();
   void receive();
+  void require_images() const;
   void take(CameraSample sample);
   void take_inertial(const CameraSample& sample);
+  bool is_repeated(const CameraSample& sample);
+  bool has_right_pixels(const CameraSample& sample);
   bool is_of_one_clock(const CameraSample& sample);
-  void count_missing(const CameraSample& sample);
-  std::optional<Frame> frame_of(Pairing::Pair images);
-  cv::Mat registered(const cv::Mat& raw);
+  Frame frame_of(Pairing::Pair images);
 
-  std::unique_ptr<DepthCamera> driver_;
+  std::unique_ptr<CameraConnection> connection_;
   LiveSourceOptions options_;
   std::function<void(const CameraSample&)> on_sample_;
-  std::optional<SE3> T_body_camera_;
-  DepthCameraDevice device_;
   DepthCameraCalibration calibration_;
-  std::optional<DepthRegistration> registration_;
+  DepthRegistration registration_;
   Pairing pairing_;
-  MissingDepth missing_depth_;
   InertialQueue inertial_;
   ExposureSettling settling_;
+  std::deque<CameraSample> received_;  // and not yet used
 
-  bool is_open_ = false, has_frame_ = false;
-  Clock::time_point created_, opened_, last_image_;
-  int failed_attempts_ = 0;
-  std::string why_lost_;
-  std::map<CameraStream, std::uint64_t> numbers_;  // of the last image of each stream
-  std::map<CameraStream, std::string> clocks_;     // likewise
+  bool has_frame_ = false, has_depth_ = false;
+  int openings_ = 0;
+  Clock::time_point created_, last_colour_, last_depth_, clocks_agreed_;
+  std::map<CameraStream, std::pair<std::uint64_t, std::int64_t>> last_;  // number and stamp of the last image
+  std::map<CameraStream, std::string> clocks_;                           // that stamped it
+  std::string clock_;                                                    // of both, of the last frame
   Counts skipped_, skipped_depth_, notes_;
-
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool is_interrupted_ = false;  // guarded by mutex_
+  MissingDepth missing_depth_;
 };
 
 }  // namespace roslam

@@ -14,7 +14,7 @@
 namespace roslam {
 
 AppendedFile::AppendedFile(std::filesystem::path file, std::string_view header) : file_(std::move(file)) {
-  write_file(file_, header);
+  replace_file(file_, header);
   open();
 }
 

@@ -58,7 +58,7 @@ McapWriter::McapWriter(const std::filesystem::path& file, const McapWriterOption
 McapWriter::~McapWriter() {
   try {
     close();
-  } catch (const Error&) {  // the file is readable without its end
+  } catch (const std::exception&) {  // the file is readable without its end
   }
 }
 
@@ -217,7 +217,16 @@ void McapWriter::close() {
   const std::string bytes = data_end + end + last.bytes();
   if (!file_.append(bytes)) fail();
   written_ += bytes.size();
+  sync();
+}
+
+void McapWriter::sync() {
   if (!file_.sync()) throw OutputError(file_.path().string() + ": the disk refused to keep it");
+}
+
+void McapWriter::flush() {
+  end_chunk();
+  sync();
 }
 
 }  // namespace roslam

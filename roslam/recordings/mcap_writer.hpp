@@ -24,8 +24,8 @@ struct McapWriterOptions {
 
 /// Writes ROS 2 messages to an MCAP file (mcap.dev/spec, version 0), in chunks that are compressed each by
 /// itself and have a checksum. A chunk is in the file as soon as it ends, so that of a program that is killed
-/// only the last chunk is lost; the file is then without an index, and is read all the same. close() writes
-/// the index. For one thread at a time.
+/// only the last chunk is lost, and of a power cut what came after the last flush(); the file is then without
+/// an index, and is read all the same. close() writes the index. For one thread at a time.
 class ROSLAM_EXPORT McapWriter {
  public:
   /// Makes the file, in place of an older one. Throws OutputError, and InputError if the compression was not
@@ -45,6 +45,9 @@ class ROSLAM_EXPORT McapWriter {
   /// is full or fails; what was written before stays readable, and the message is lost. Throws UsageError for
   /// an id that add_topic() did not give, or a negative time.
   void write(int topic, std::int64_t time, std::span<const std::uint8_t> message);
+
+  /// Ends the chunk and waits until all that was written is on the disk. Throws OutputError.
+  void flush();
 
   /// Ends the file with the last chunk and the index. Throws OutputError. Called by the destructor, which
   /// swallows the error.
@@ -68,6 +71,7 @@ class ROSLAM_EXPORT McapWriter {
 
   [[noreturn]] void fail() const;
   void end_chunk();
+  void sync();
   std::string summary() const;
 
   McapWriterOptions options_;

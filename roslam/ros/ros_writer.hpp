@@ -5,10 +5,13 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
+
+#include "roslam/common/error.hpp"
 
 namespace roslam {
 
@@ -49,11 +52,13 @@ class RosWriter {
     for (const double value : values) put(value);
   }
 
-  /// stamp: nanoseconds.
+  /// stamp: nanoseconds. Throws InputError for one beyond 68 years from zero.
   void header(std::int64_t stamp, std::string_view frame) {
     constexpr std::int64_t kSecond = 1'000'000'000;
     std::int64_t seconds = stamp / kSecond;
     if (stamp % kSecond < 0) --seconds;
+    if (static_cast<std::int32_t>(seconds) != seconds)
+      throw InputError("a time stamp that a ROS 2 message cannot hold: " + std::to_string(seconds) + " s");
     put(static_cast<std::int32_t>(seconds));
     put(static_cast<std::uint32_t>(stamp - seconds * kSecond));
     text(frame);

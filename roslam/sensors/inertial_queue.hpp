@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <deque>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "roslam/sensors/inertial_sample.hpp"
@@ -11,14 +14,26 @@ namespace roslam {
 
 /// Inertial samples that wait for the frame they belong to. Those of a gyroscope and an accelerometer that
 /// measure at times of their own are joined: each turn rate, which comes more often, with the newest
-/// acceleration. Bounded: of very many the oldest are lost. Not thread safe.
+/// acceleration. A clock has restarted, or leapt, where two samples in a row show it; one with a time far
+/// from the others is left out. Bounded: of very many the oldest are lost. Not thread safe.
 class InertialQueue {
  public:
   void add(const InertialSample& sample) {
-    if (last_ && sample.timestamp < *last_ - kRestart) ++restarts_;
-    last_ = sample.timestamp;
-    samples_.push_back({sample, restarts_});
-    if (samples_.size() > kMost) samples_.pop_front();
+    const double time = sample.timestamp;
+    const auto candidate = std::exchange(candidate_, std::nullopt);
+    const bool is_expected = !last_ || (time > *last_ - kRestart && time < *last_ + kLongestGap);
+    if (!is_expected && !(candidate && std::abs(time - candidate->timestamp) < kRestart)) {
+      candidate_ = sample;
+      return;
+    }
+    if (!is_expected) {
+      if (time < *last_) {
+        ++restarts_;
+        last_.reset();
+      }
+      push(*candidate);
+    }
+    push(sample);
   }
 
   void add_acceleration(const Eigen::Vector3d& acceleration) { acceleration_ = acceleration; }
@@ -28,20 +43,18 @@ class InertialQueue {
     if (acceleration_) add({timestamp, turn_rate, *acceleration_});
   }
 
-  /// Takes the samples until the time of a frame, in seconds. segment: of the frame. Samples after a restart of
-  /// their clock are for the frames after the restart, though their times are earlier.
+  /// Takes the samples until the time of a frame, in seconds. segment: of the frame. Samples after a restart
+  /// of their clock are for the frames after the restart, though their times are earlier.
   std::vector<InertialSample> take_until(double timestamp, int segment) {
-    if (segment != segment_) {
-      segment_ = segment;
-      while (!samples_.empty() && samples_.front().restarts < restarts_) samples_.pop_front();
-      taken_restarts_ = restarts_;
-    }
+    // The frames have followed the restart, or it was of the inertial unit alone.
+    const bool follows = segment != segment_ || (last_ && std::abs(timestamp - *last_) < kRestart);
+    segment_ = segment;
+    if (follows) taken_restarts_ = restarts_;
+    while (!samples_.empty() && samples_.front().restarts < taken_restarts_) samples_.pop_front();
     std::vector<InertialSample> taken;
-    while (!samples_.empty()) {
-      const auto& [sample, restarts] = samples_.front();
-      const bool is_of_frame = restarts == taken_restarts_ || timestamp - sample.timestamp < kRestart;
-      if (sample.timestamp > timestamp || !is_of_frame) break;
-      taken.push_back(sample);
+    while (!samples_.empty() && samples_.front().restarts == taken_restarts_ &&
+           samples_.front().sample.timestamp <= timestamp) {
+      taken.push_back(samples_.front().sample);
       samples_.pop_front();
     }
     return taken;
@@ -54,11 +67,19 @@ class InertialQueue {
   };
 
   static constexpr std::size_t kMost = 4000;
-  static constexpr double kRestart = 1.0;  // seconds that a clock goes back by
+  static constexpr double kRestart = 1.0;     // seconds that a clock goes back by
+  static constexpr double kLongestGap = 0.1;  // seconds; a sample later than that has to be confirmed
+
+  void push(const InertialSample& sample) {
+    last_ = std::max(sample.timestamp, last_.value_or(sample.timestamp));
+    samples_.push_back({sample, restarts_});
+    if (samples_.size() > kMost) samples_.pop_front();
+  }
 
   std::deque<Waiting> samples_;
   std::optional<Eigen::Vector3d> acceleration_;
-  std::optional<double> last_;
+  std::optional<double> last_;               // time of the newest sample
+  std::optional<InertialSample> candidate_;  // may be the first after a restart
   int restarts_ = 0, taken_restarts_ = 0;
   int segment_ = 0;
 };

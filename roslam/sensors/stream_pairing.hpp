@@ -61,6 +61,20 @@ class StreamPairing {
     return pair;
   }
 
+  /// Both streams begin anew, such as when their clock has changed: images that wait are lost, and the next
+  /// ones are of a new segment.
+  void restart() {
+    const int segment = restarts() + 1;
+    for (Stream* stream : {&colour_, &depth_}) {
+      if (!stream->images.empty()) stream->skipped[kAlone] += stream->images.size();
+      stream->images.clear();
+      stream->last.reset();
+      stream->before.reset();
+      stream->candidate.reset();
+      stream->segment = segment;
+    }
+  }
+
   const StreamPairingOptions& options() const { return options_; }
 
   /// Images that were left out, by reason in words.

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <chrono>
+#include <condition_variable>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <mutex>
+#include <thread>
 
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/interrupt.hpp"
@@ -30,26 +34,47 @@ void print_counts(const char* what, const std::map<std::string, std::size_t>& co
 // A recording that is read and written at once would be destroyed.
 void require_another_file(const RecordArguments& arguments) {
   std::error_code error;
-  if (std::filesystem::equivalent(arguments.source.name, arguments.out, error))
-    throw InputError("--out " + arguments.out + ": is the source itself; choose another file");
+  const std::filesystem::path out(arguments.out), folder = out.has_parent_path() ? out.parent_path() : ".";
+  const std::filesystem::path& source = arguments.source.name;
+  if (std::filesystem::equivalent(source, out, error) ||
+      (std::filesystem::is_directory(source, error) && std::filesystem::equivalent(source, folder, error)))
+    throw InputError("--out " + arguments.out +
+                     ": is the source itself, or in its folder; choose another file");
 }
+
+// Requests a stop after a time, or when another one is requested: a camera that is lost gives no frame to end
+// at.
+class TimedStop {
+ public:
+  TimedStop(const std::stop_token& other, double seconds)
+      : forward_(other, [this] { source_.request_stop(); }),
+        timer_([this, seconds](const std::stop_token& end) {
+          std::mutex mutex;
+          std::condition_variable_any wake;
+          std::unique_lock lock(mutex);
+          wake.wait_for(lock, end, std::chrono::duration<double>(seconds), [] { return false; });
+          if (!end.stop_requested()) source_.request_stop();
+        }) {}
+  std::stop_token token() const { return source_.get_token(); }
+
+ private:
+  std::stop_source source_;
+  std::stop_callback<std::function<void()>> forward_;
+  std::jthread timer_;
+};
 
 std::size_t record(FrameSource& source, SourceRecorder& recorder, const RecordArguments& arguments,
                    const std::stop_token& stop) {
-  using Clock = std::chrono::steady_clock;
   Progress progress(source.size(), arguments.quiet);
-  const auto start = Clock::now();
   std::optional<double> first;
   std::size_t frames = 0;
   while (auto frame = source.next(stop)) {
-    recorder.add(*frame);
+    recorder.add(*frame, stop);
     ++frames;
     progress.show(frames, "recorded");
     if (recorder.recorder().has_failed()) break;
     if (!first) first = frame->timestamp;
-    const double duration = source.is_live() ? std::chrono::duration<double>(Clock::now() - start).count()
-                                             : frame->timestamp - *first;
-    if (arguments.seconds > 0.0 && duration >= arguments.seconds) break;
+    if (!source.is_live() && arguments.seconds > 0.0 && frame->timestamp - *first >= arguments.seconds) break;
   }
   return frames;
 }
@@ -61,7 +86,11 @@ void execute(RecordArguments arguments) {
   const auto source = open_source(arguments.source);
   const InterruptWatcher interrupt;
   SourceRecorder recorder(*source, arguments.out);
-  const std::size_t frames = record(*source, recorder, arguments, interrupt.token());
+  const bool is_timed = source->is_live() && arguments.seconds > 0.0;
+  std::optional<TimedStop> timed;
+  if (is_timed) timed.emplace(interrupt.token(), arguments.seconds);
+  const std::size_t frames =
+      record(*source, recorder, arguments, is_timed ? timed->token() : interrupt.token());
   recorder.close();
   if (frames == 0 && !interrupt.token().stop_requested())
     throw InputError(arguments.source.name + ": no frame could be recorded" + in_words(source->skipped()));

@@ -147,7 +147,8 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   const auto restorations = std::make_shared<Restorations>();
   flight.slam = open_slam(camera, options, mode, setup_of(arguments, restorations));
   const RunFolder folder(arguments.out, arguments.overwrite);
-  flight.description.source = arguments.source.name;
+  // The recording has the same frames and can be read again.
+  flight.description.source = arguments.record.empty() ? arguments.source.name : arguments.record;
   flight.description.camera = arguments.source.camera;
   flight.description.version = version;
   if (!arguments.map.empty()) flight.description.map = map_file(arguments.map).string();

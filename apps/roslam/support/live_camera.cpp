@@ -2,6 +2,7 @@
 #include "apps/roslam/support/live_camera.hpp"
 
 #include <cstdio>
+#include <filesystem>
 
 #include "roslam/cameras/realsense_camera.hpp"
 #include "roslam/geometry/mount.hpp"
@@ -13,6 +14,7 @@ constexpr const char* kRealsense = "realsense";
 
 DepthCameraMode mode_from(const std::string& text) {
   DepthCameraMode mode;
+  if (text.empty()) return mode;
   int length = 0;
   const int found = std::sscanf(text.c_str(), "%5dx%5d@%4d%n", &mode.width, &mode.height, &mode.fps, &length);
   constexpr int kNumbers = 3;
@@ -24,6 +26,21 @@ DepthCameraMode mode_from(const std::string& text) {
 DepthCameraCalibration calibration_of(const FrameSource& source) {
   if (const auto* live = dynamic_cast<const LiveSource*>(&source)) return live->calibration();
   return {source.camera(), source.camera(), SE3()};
+}
+
+// The file, after an older one was renamed.
+const std::string& kept(const std::string& file, const FrameSource& source) {
+  if (source.is_live() && dynamic_cast<const LiveSource*>(&source) == nullptr)
+    throw InputError(
+        file + ": a camera whose images are made worse (--degrade) is not recorded; leave one of them out");
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error) || std::filesystem::file_size(file, error) == 0)
+    return file;
+  int number = 1;
+  while (std::filesystem::exists(file + "." + std::to_string(number), error)) ++number;
+  std::filesystem::rename(file, file + "." + std::to_string(number), error);
+  if (error) throw OutputError(file + ": cannot be renamed to keep it; choose another name");
+  return file;
 }
 
 CameraRecorderOptions options_of(const FrameSource& source) {
@@ -49,13 +66,18 @@ std::unique_ptr<LiveSource> open_live_camera(const std::string& name, const std:
 }
 
 SourceRecorder::SourceRecorder(FrameSource& source, const std::string& file)
-    : file_(file), is_live_(source.is_live()), recorder_(file, calibration_of(source), options_of(source)) {
-  if (auto* live = dynamic_cast<LiveSource*>(&source))
-    live->on_sample([this](const CameraSample& sample) { recorder_.add(sample); });
+    : file_(file),
+      live_(dynamic_cast<LiveSource*>(&source)),
+      recorder_(kept(file, source), calibration_of(source), options_of(source)) {
+  if (live_ != nullptr) live_->on_sample([this](const CameraSample& sample) { recorder_.add(sample); });
 }
 
-void SourceRecorder::add(const Frame& frame) {
-  if (!is_live_) recorder_.add(frame);
+SourceRecorder::~SourceRecorder() {
+  if (live_ != nullptr) live_->on_sample({});
+}
+
+void SourceRecorder::add(const Frame& frame, const std::stop_token& stop) {
+  if (live_ == nullptr) recorder_.add(frame, stop);
 }
 
 std::string SourceRecorder::in_words() const {

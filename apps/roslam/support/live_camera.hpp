@@ -16,14 +16,18 @@ bool is_live_camera(const std::string& name);
 std::unique_ptr<LiveSource> open_live_camera(const std::string& name, const std::string& stream,
                                              const std::string& mount);
 
-/// Records what a source gives to a file: of a camera the samples as they came, of others the frames.
+/// Records what a source gives to a file: of a camera the samples as they came, of others the frames. An
+/// older file of the name is kept: it is renamed FILE.1, FILE.2 and so on.
 class SourceRecorder {
  public:
   /// Throws OutputError.
   SourceRecorder(FrameSource& source, const std::string& file);
+  ~SourceRecorder();
+  SourceRecorder(const SourceRecorder&) = delete;
+  SourceRecorder& operator=(const SourceRecorder&) = delete;
 
   /// To be called with each frame of the source.
-  void add(const Frame& frame);
+  void add(const Frame& frame, const std::stop_token& stop);
 
   /// Ends the file. Throws OutputError.
   void close() { recorder_.close(); }
@@ -35,7 +39,7 @@ class SourceRecorder {
 
  private:
   std::string file_;
-  bool is_live_;
+  LiveSource* live_;  // null: another source
   CameraRecorder recorder_;
 };
 

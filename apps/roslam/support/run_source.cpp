@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "apps/roslam/support/live_camera.hpp"
 #include "apps/roslam/support/sources.hpp"
 #include "roslam/common/error.hpp"
 #include "roslam/datasets/dataset.hpp"
@@ -15,6 +16,9 @@ namespace roslam::app {
 using namespace simulation;
 
 std::unique_ptr<FrameSource> open_source_of(const recording::RunSource& run) {
+  if (is_live_camera(run.name))
+    throw InputError("the run is of the camera " + run.name +
+                     ", which gives other images now; record it with roslam run --record");
   const bool is_simulated = run.name.starts_with("simulated:");
   std::error_code error;
   if (is_simulated ? run.flight.empty() : !std::filesystem::exists(run.name, error)) {

@@ -72,10 +72,10 @@ void add_topic_options(CLI::App& command, SourceArguments& arguments) {
 }
 
 void add_stream_option(CLI::App& command, SourceArguments& arguments) {
-  command
-      .add_option("--stream", arguments.stream,
-                  "Images of a camera that is connected: WIDTHxHEIGHT@RATE; fewer a second by USB 2")
-      ->capture_default_str();
+  command.add_option(
+      "--stream", arguments.stream,
+      "Images of a camera that is connected: WIDTHxHEIGHT@RATE, default 640x480@30; fewer a second by "
+      "USB 2");
 }
 
 void add_mount_option(CLI::App& command, SourceArguments& arguments) {
@@ -283,6 +283,9 @@ std::unique_ptr<FrameSource> open_source(const SourceArguments& arguments) {
       throw InputError(topic + ": is a topic of a recording, and " + arguments.name +
                        " is none; leave it out");
   });
+  if (!arguments.stream.empty() && !is_live_camera(arguments.name))
+    throw InputError("--stream " + arguments.stream + ": is of a camera, and " + arguments.name +
+                     " is none; leave it out");
   if (const auto flight = simulated_flight(arguments)) {
     source = std::make_unique<SimulatedSource>(*flight);
   } else if (is_live_camera(arguments.name)) {

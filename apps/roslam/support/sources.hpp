@@ -19,8 +19,8 @@ namespace roslam::app {
 struct SourceArguments {
   std::string name;    ///< a folder, a recording, realsense[:SERIAL] or simulated:street|loop|hover|turn
   std::string camera;  ///< a preset or a file; not needed where the source knows it
-  RecordingChoice topics = {};        ///< of a recording
-  std::string stream = "640x480@30";  ///< of a camera that is connected
+  RecordingChoice topics = {};  ///< of a recording
+  std::string stream = {};      ///< of a camera that is connected; empty: the usual one
   std::string mount = {};  ///< of the camera on the drone: X,Y,Z,ROLL,PITCH,YAW; empty: as the camera file
   std::string traffic = "light";  ///< the rest: of a simulated flight; none, light, heavy
   std::size_t frames = 0;         ///< 0 = the whole flight
