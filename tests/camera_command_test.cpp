@@ -90,6 +90,36 @@ TEST_F(CameraCommand, RefusesWhatItCannotDo) {
 }
 
 // The street as an equidistant fisheye sees it.
+TEST_F(CameraCommand, ChecksARecording) {
+  const std::string street = "check '" + kFolder.string() + "' --camera simulated --quiet --json";
+  const Outcome clean = camera(street);
+  EXPECT_EQ(clean.code, 0) << clean.error << clean.out;
+  EXPECT_EQ(clean.error, "");
+  const auto report = nlohmann::json::parse(clean.out, nullptr, false);
+  EXPECT_EQ(report["nothing_misfits"], true);
+  for (const char* name : {"depth_scale", "registration", "timing", "distortion"})
+    EXPECT_NE(report[name]["verdict"], "does not fit") << name;
+  const Outcome wrong = camera(street + " --fault depth-too-large");
+  EXPECT_EQ(wrong.code, 3);
+  EXPECT_NE(wrong.error.find("depth scale"), std::string::npos) << wrong.error;
+  EXPECT_EQ(std::count(wrong.error.begin(), wrong.error.end(), '\n'), 1) << wrong.error;
+  const auto found = nlohmann::json::parse(wrong.out, nullptr, false);
+  EXPECT_EQ(found["depth_scale"]["verdict"], "does not fit");
+  EXPECT_EQ(found["depth_scale"]["remedy"], "set depth_units_per_metre 1000");
+  const Outcome preset = camera("check '" + kFolder.string() + "' --camera d455 --quiet");
+  EXPECT_NE(preset.out.find("no lens distortion"), std::string::npos) << preset.out << preset.error;
+}
+
+TEST_F(CameraCommand, RefusesToCheckWhatHasNoDepth) {
+  make(5);
+  expect_refused(camera("check '" + data_.string() + "' --camera simulated --quiet"),
+                 {"10 consecutive frames"});
+  expect_refused(camera("check '" + data_.string() + "' --quiet"), {"--camera"});
+  expect_refused(camera("check /nowhere --camera simulated"), {"/nowhere"});
+  EXPECT_EQ(camera("check").code, 2);
+  EXPECT_EQ(camera("check '" + data_.string() + "' --camera simulated --fault none").code, 2);
+}
+
 class FisheyeFlight : public CameraCommand {
  protected:
   static constexpr std::size_t kFlight = 30;

@@ -89,6 +89,9 @@ int main(int argc, char** argv) {
   } catch (const roslam::app::IncompleteRun& error) {
     std::cerr << "error: " << one_line(error.what()) << "\n";
     return kIncomplete;
+  } catch (const roslam::app::FailedCheck& error) {
+    std::cerr << "error: " << one_line(error.what()) << "\n";
+    return kIncomplete;
   } catch (const std::exception& error) {
     const bool is_memory = roslam::is_out_of_memory(error);
     std::cerr << "error: "

@@ -53,7 +53,6 @@ void DepthScale::add_row(const float* row, int size) {
   }
 }
 
-// k * fx, 1/metre; nothing unless the steps of depth grow with its square.
 std::optional<double> DepthScale::step_factor() const {
   constexpr std::size_t kFewestSteps = 4;   // in a band
   constexpr std::size_t kValuesAStep = 20;  // so that every step is seen

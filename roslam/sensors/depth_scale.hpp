@@ -24,12 +24,17 @@ class DepthScale {
   /// otherwise or while there are too few data.
   std::optional<double> implausible_baseline() const;
 
+  /// Baseline in metres that the shadows show; nothing where there are too few.
+  std::optional<double> baseline() const;
+
+  /// k * fx in 1/metre, by the steps of depth, which is the step of disparity over the baseline; nothing
+  /// unless they grow with the square of depth.
+  std::optional<double> step_factor() const;
+
  private:
   static constexpr std::size_t kBands = 32;  // of depth
 
   void add_row(const float* row, int size);
-  std::optional<double> step_factor() const;
-  std::optional<double> baseline() const;
 
   double fx_ = 0.0;
   std::size_t images_ = 0;

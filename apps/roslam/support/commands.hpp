@@ -13,6 +13,12 @@ class IncompleteRun : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// A check has a negative result, which is printed: exit code 3 as well.
+class FailedCheck : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 // Each adds one subcommand. Its callback does the work and throws roslam::Error on bad input.
 void add_run_command(CLI::App& program, const std::string& version);
 /// `camera list`; camera: the command it belongs to.

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/roslam/camera/camera_check_command.hpp"
+#include "apps/roslam/camera/camera_notes.hpp"
 #include "apps/roslam/support/commands.hpp"
 #include "apps/roslam/support/live_camera.hpp"
 #include "apps/roslam/support/output.hpp"
@@ -57,13 +59,8 @@ ImportedCamera camera_of(const CameraArguments& arguments) {
   if (camera.depth_units_per_metre == 0.0)
     imported.notes.push_back("depth_units_per_metre is not set, which 16-bit depth images need; " +
                              std::string(usual_depth_units()) + " (--depth-units)");
-  if (imported.format == "a preset" && arguments.camera == "d455")
-    imported.notes.push_back(
-        "this preset has no lens distortion. The colour lens of a real D455 has some, 2 to 4 pixels towards "
-        "the "
-        "corners at 640x480, and each camera its own focal length: take both from its camera_info, from the "
-        "SDK "
-        "or from a calibration with Kalibr or OpenCV, and give that file as the camera");
+  if (imported.format == "a preset")
+    for (const std::string& note : preset_notes(arguments.camera)) imported.notes.push_back(note);
   if (camera.model == LensModel::kFisheye)
     imported.notes.emplace_back("pixels beyond 80 degrees from the axis of a fisheye are not used");
   if (!camera.has_central_principal_point())
@@ -267,10 +264,11 @@ void add_convert_command(CLI::App& camera) {
 
 void add_camera_command(CLI::App& program) {
   CLI::App* camera =
-      program.add_subcommand("camera", "Show and convert camera files, list connected cameras");
+      program.add_subcommand("camera", "Show, convert and check camera files, list connected cameras");
   camera->require_subcommand(1);
   add_show_command(*camera);
   add_convert_command(*camera);
+  add_camera_check_command(*camera);
   add_camera_list_command(*camera);
 }
 
