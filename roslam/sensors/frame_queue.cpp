@@ -66,6 +66,11 @@ void FrameQueue::close() {
   changed_.notify_all();
 }
 
+bool FrameQueue::is_closed() const {
+  const std::scoped_lock lock(mutex_);
+  return closed_;
+}
+
 std::size_t FrameQueue::dropped() const {
   const std::scoped_lock lock(mutex_);
   return dropped_;

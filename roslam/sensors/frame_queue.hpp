@@ -35,6 +35,8 @@ class FrameQueue {
   /// No more frames will come.
   void close();
 
+  bool is_closed() const;
+
   std::size_t dropped() const;
 
   /// The most frames dropped between two that were handed out.

@@ -34,6 +34,9 @@ class PacedReader {
   /// thread.
   void stop();
 
+  /// Whether the source has ended: what next() gives now is all that is left.
+  bool is_at_end() const { return queue_.is_closed(); }
+
   std::size_t dropped() const { return queue_.dropped(); }
 
   /// The most frames dropped in a row.
