@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "roslam/common/error.hpp"
+#include "roslam/common/thread_priority.hpp"
 #include "telemetry/mavlink/file_descriptor.hpp"
 
 namespace roslam::telemetry {
@@ -155,6 +156,7 @@ void MavlinkSender::Impl::warn(const std::string& words) {
 void MavlinkSender::Impl::wake() const { eventfd_write(wake_.get(), 1); }
 
 void MavlinkSender::Impl::work(const std::stop_token& stop) {
+  raise_thread_priority();  // microseconds of work a frame, and a pose is worth less the later it is
   while (true) {
     const bool is_last = stop.stop_requested();
     if (!is_last) wait();

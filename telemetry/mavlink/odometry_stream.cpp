@@ -20,6 +20,26 @@ void require(bool is_right, const std::string& field) {
 std::uint64_t microseconds_of(double timestamp) {
   return static_cast<std::uint64_t>(std::llround(std::max(0.0, timestamp) * kMicroseconds));
 }
+// Why there is no pose, short enough for a text of 50 letters.
+std::string_view short_words(NoPose reason) {
+  switch (reason) {
+    case NoPose::kNone:
+      break;
+    case NoPose::kNoMap:
+      return "no map";
+    case NoPose::kNotRecognised:
+      return "place not recognised";
+    case NoPose::kFewLandmarks:
+      return "too few landmarks agree";
+    case NoPose::kUncertain:
+      return "pose not constrained by the view";
+    case NoPose::kPoorFit:
+      return "matches are poor";
+    case NoPose::kImplausible:
+      return "motion not plausible";
+  }
+  return "no pose";
+}
 }  // namespace
 
 void OdometryStreamOptions::validate() const {
@@ -46,8 +66,8 @@ void OdometryStream::note_state(const TrackingReport& report, std::vector<Mavlin
   ++counts_.without_pose;
   if (!has_had_pose_ || is_lost_) return;
   is_lost_ = true;
-  say(MavlinkSeverity::kWarning, "RO-SLAM: lost, " + std::string(describe(report.no_pose)), report.timestamp,
-      messages);
+  say(MavlinkSeverity::kWarning, "RO-SLAM: lost, " + std::string(short_words(report.no_pose)),
+      report.timestamp, messages);
 }
 
 void OdometryStream::note_pose(const TrackingReport& report, std::vector<MavlinkMessage>& messages) {
