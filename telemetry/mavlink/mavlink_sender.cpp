@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <cstdio>
 #include <deque>
 #include <mutex>
@@ -16,6 +15,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/thread_priority.hpp"
+#include "telemetry/mavlink/autopilot_watch.hpp"
 #include "telemetry/mavlink/file_descriptor.hpp"
 
 namespace roslam::telemetry {
@@ -25,7 +25,6 @@ using Clock = std::chrono::steady_clock;
 constexpr std::size_t kRoom = 64;          // frames that may wait
 constexpr std::size_t kMostWarnings = 20;  // of a run
 constexpr auto kSecond = std::chrono::seconds(1);
-constexpr int kOriginTimes = 3;  // that the origin is told, as a message may be lost
 
 // A frame and when its pose was known.
 struct Waiting {
@@ -62,9 +61,7 @@ class MavlinkSender::Impl {
   void say(MavlinkSeverity severity, const std::string& words) { send(StatusTextMessage(severity, words)); }
   void each_second();
   void check_camera(Clock::time_point now);
-  void check_autopilot(Clock::time_point now);
   void tell_loops();
-  void tell_origin();
   void note_link();
   void warn(const std::string& words);
 
@@ -77,13 +74,12 @@ class MavlinkSender::Impl {
   std::unique_ptr<MavlinkLink> link_;
   OdometryStream stream_;
   MavlinkDecoder decoder_;
+  AutopilotWatch watch_;
   std::uint8_t sequence_ = 0;
-  Clock::time_point begun_ = Clock::now(), due_ = begun_;  // due: when the next heartbeat is
-  std::optional<Clock::time_point> last_frame_, last_heard_;
-  std::uint8_t autopilot_ = 0;
+  Clock::time_point due_ = Clock::now();  // when the next heartbeat is
+  std::optional<Clock::time_point> last_frame_;
   std::size_t loops_told_ = 0;
-  int origin_left_ = 0;
-  bool is_camera_lost_ = false, is_warned_of_autopilot_ = false, was_link_lost_ = false;
+  bool is_camera_lost_ = false, was_link_lost_ = false;
 
   mutable std::mutex mutex_;  // guards what follows
   std::deque<Waiting> waiting_;
@@ -96,7 +92,11 @@ class MavlinkSender::Impl {
 };
 
 MavlinkSender::Impl::Impl(const MavlinkAddress& address, const MavlinkSenderOptions& options, Loops loops)
-    : address_(address), options_(options), loops_(std::move(loops)), stream_(options.stream) {
+    : address_(address),
+      options_(options),
+      loops_(std::move(loops)),
+      stream_(options.stream),
+      watch_(address.kind, options) {
   options.validate();
   if (!wake_) throw MemoryError("--mavlink " + address.text + ": too many files are open");
   link_ = open_mavlink_link(address);
@@ -202,14 +202,10 @@ void MavlinkSender::Impl::take(const ReceivedMessage& received) {
   if (const auto* question = std::get_if<TimesyncMessage>(&received.message))
     answer(*question, received.sender);
   const auto* heartbeat = std::get_if<HeartbeatMessage>(&received.message);
-  if (heartbeat == nullptr || heartbeat->autopilot == kNoAutopilot) return;
-  const auto now = Clock::now();
-  // It may have begun anew meanwhile.
-  if (!last_heard_ || now - *last_heard_ > options_.autopilot_silence) origin_left_ = kOriginTimes;
-  last_heard_ = now;
-  autopilot_ = received.sender.system;
+  if (heartbeat == nullptr) return;
+  watch_.hear(*heartbeat, received.sender);
   const std::scoped_lock lock(mutex_);
-  report_.autopilot = autopilot_;
+  report_.autopilot = watch_.system();
 }
 
 // On the clock of time_usec, at once: the way of the message counts twice.
@@ -274,8 +270,8 @@ void MavlinkSender::Impl::each_second() {
   heartbeat.system_status =
       static_cast<std::uint8_t>(is_camera_lost_ ? MavlinkState::kCritical : stream_.state());
   send(heartbeat);
-  check_autopilot(now);
-  tell_origin();
+  if (const auto doubt = watch_.doubt()) warn(*doubt);
+  if (const auto origin = watch_.next_origin()) send(*origin);
   tell_loops();
 }
 
@@ -286,33 +282,6 @@ void MavlinkSender::Impl::check_camera(Clock::time_point now) {
   is_camera_lost_ = true;
   say(MavlinkSeverity::kCritical,
       in_words("RO-SLAM: no images for %.1f s", std::chrono::duration<double>(now - *last_frame_).count()));
-}
-
-void MavlinkSender::Impl::check_autopilot(Clock::time_point now) {
-  if (now - last_heard_.value_or(begun_) < options_.autopilot_silence) {
-    is_warned_of_autopilot_ = false;
-    return;
-  }
-  if (is_warned_of_autopilot_) return;
-  is_warned_of_autopilot_ = true;
-  const bool is_serial = address_.kind == MavlinkAddress::Kind::kSerial;
-  warn(std::string(last_heard_ ? "the autopilot is not heard any more" : "no autopilot is heard") +
-       (is_serial ? "; check both wires, the baud rate and the protocol (MAVLink 2) of its port"
-                  : "; check host and port, and that it answers from that port") +
-       "; poses are sent all the same");
-}
-
-void MavlinkSender::Impl::tell_origin() {
-  if (!options_.origin || origin_left_ == 0) return;
-  --origin_left_;
-  constexpr double kDegrees = 1e7, kMetres = 1e3;
-  GpsOriginMessage origin;
-  origin.latitude = static_cast<std::int32_t>(std::lround(kDegrees * options_.origin->latitude));
-  origin.longitude = static_cast<std::int32_t>(std::lround(kDegrees * options_.origin->longitude));
-  origin.altitude = static_cast<std::int32_t>(std::lround(kMetres * options_.origin->altitude));
-  origin.target_system = autopilot_;
-  origin.time_usec = static_cast<std::uint64_t>(CompanionClock::now_nanoseconds() / 1000);
-  send(origin);
 }
 
 void MavlinkSender::Impl::tell_loops() {
