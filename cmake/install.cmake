@@ -5,12 +5,16 @@ include(CMakePackageConfigHelpers)
 include(${PROJECT_SOURCE_DIR}/cmake/public_headers.cmake)
 set(ROSLAM_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/roslam)
 
-install(TARGETS roslam roslam_sensors EXPORT roslamTargets
+install(TARGETS roslam roslam_sensors roslam_telemetry EXPORT roslamTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
   INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 foreach(header ${ROSLAM_PUBLIC_HEADERS})
   get_filename_component(folder ${header} DIRECTORY)
   install(FILES ${PROJECT_SOURCE_DIR}/roslam/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/roslam/${folder})
+endforeach()
+foreach(header ${ROSLAM_PUBLIC_TELEMETRY_HEADERS})
+  get_filename_component(folder ${header} DIRECTORY)
+  install(FILES ${PROJECT_SOURCE_DIR}/telemetry/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/telemetry/${folder})
 endforeach()
 install(FILES ${PROJECT_BINARY_DIR}/generated/roslam/version.hpp DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/roslam)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/models DESTINATION ${CMAKE_INSTALL_DATADIR}/roslam

@@ -91,3 +91,17 @@ set(ROSLAM_PUBLIC_HEADERS
   slam/run.hpp
   slam/slam.hpp
 )
+
+# Of telemetry/, which is installed beside roslam/.
+set(ROSLAM_PUBLIC_TELEMETRY_HEADERS
+  mavlink/companion_clock.hpp
+  mavlink/mavlink_frame.hpp
+  mavlink/mavlink_link.hpp
+  mavlink/mavlink_report.hpp
+  mavlink/mavlink_sender.hpp
+  mavlink/mavlink_sender_options.hpp
+  mavlink/odometry_message.hpp
+  mavlink/odometry_stream.hpp
+  mavlink/stream_check.hpp
+  mavlink/tracking_report.hpp
+)

@@ -11,6 +11,7 @@
 #include "roslam/map_io/map_file.hpp"
 #include "roslam/occupancy/occupancy_map.hpp"
 #include "roslam/options/options.hpp"
+#include "telemetry/mavlink/mavlink_frame.hpp"
 #include "tests/onnx_writer.hpp"
 #include "tests/recording_writers.hpp"
 #include "tests/ros_writer.hpp"
@@ -172,6 +173,21 @@ void put_cameras(const std::filesystem::path& folder) {
              "%YAML:1.0\nCamera.fx: 500\nCamera.fy: 500\nCamera.cx: 320\nCamera.cy: 240\nCamera.k1: 0.1\n"
              "Camera.width: 640\nCamera.height: 480\nDepthMapFactor: 5000\n");
 }
+
+// One message of each kind, after the byte that says how the stream is cut.
+void put_mavlink(const std::filesystem::path& folder) {
+  using namespace telemetry;
+  make_folder(folder);
+  std::string all(1, '\x20');
+  for (const MavlinkMessage& message :
+       {MavlinkMessage(HeartbeatMessage{}), MavlinkMessage(TimesyncMessage{0, 5, 1, 197}),
+        MavlinkMessage(OdometryMessage{}), MavlinkMessage(StatusTextMessage(MavlinkSeverity::kInfo, "text")),
+        MavlinkMessage(GpsOriginMessage{1, 2, 3, 1, 4})}) {
+    const auto frame = encode(message, {}, 0);
+    all.append(frame.begin(), frame.end());
+  }
+  write_file(folder / "all", all);
+}
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -205,6 +221,7 @@ int main(int count, char** arguments) {
     occupancy.write(folder / "occupancy" / "probabilities.ot");
     write_recordings(folder);
     put_messages(folder / "ros_message");
+    put_mavlink(folder / "mavlink");
   } catch (const Error& error) {
     std::fprintf(stderr, "error: %s\n", error.what());
     return 1;

@@ -119,6 +119,47 @@ std::optional<Odometry> odometry_of(const std::vector<std::string_view>& fields)
   result.is_predicted = fields[1] == "predicted";
   return result;
 }
+
+// Of those that a function words, the one of this text.
+template <typename Enum, typename Words>
+std::optional<Enum> one_of(std::initializer_list<Enum> all, const Words& words, std::string_view text) {
+  for (const Enum one : all)
+    if (words(one) == text) return one;
+  return std::nullopt;
+}
+
+std::optional<TrackingState> state_of(std::string_view text) {
+  using enum TrackingState;
+  return one_of(
+      {kInitialising, kTracking, kPredicted, kRecentlyLost, kLost},
+      [](TrackingState state) { return name_of(state); }, text);
+}
+
+std::optional<NoPose> reason_of(std::string_view text) {
+  using enum NoPose;
+  return one_of(
+      {kNone, kNoMap, kNotRecognised, kFewLandmarks, kUncertain, kPoorFit, kImplausible},
+      [](NoPose reason) { return describe(reason); }, text);
+}
+
+std::optional<OdometryRow> row_of(std::string_view line) {
+  const auto fields = fields_of(line);
+  if (fields.size() != kNumbers + 2) return std::nullopt;
+  const auto timestamp = number_of(fields[0]);
+  const auto state = state_of(fields[1]);
+  if (!timestamp || !state) return std::nullopt;
+  OdometryRow row;
+  row.timestamp = *timestamp;
+  row.state = *state;
+  if (fields[2].empty()) {  // a frame without a pose
+    row.no_pose = reason_of(line.substr(line.rfind(',') + 1)).value_or(NoPose::kNotRecognised);
+    return row;
+  }
+  row.odometry = odometry_of(fields);
+  if (!row.odometry || !row.odometry->T_odom_body.is_finite() || !row.odometry->T_map_odom.is_finite())
+    return std::nullopt;
+  return row;
+}
 }  // namespace
 
 std::string odometry_header() {
@@ -154,23 +195,27 @@ std::string odometry_line(const FrameResult& result) {
   return line;
 }
 
-std::vector<Odometry> read_odometry(const std::filesystem::path& file) {
+std::vector<OdometryRow> read_odometry_rows(const std::filesystem::path& file) {
   std::ifstream in(file);
   if (!in) throw InputError(file.string() + ": cannot be read; give a folder that roslam run has written");
-  std::vector<Odometry> result;
+  std::vector<OdometryRow> result;
   std::string line;
   for (std::size_t number = 1; std::getline(in, line); ++number) {
     if (line.empty() || line.front() == '#') continue;
     if (in.eof()) break;  // cut off, as by a power cut
-    const auto fields = fields_of(line);
-    const bool is_whole = fields.size() == kNumbers + 2;
-    if (is_whole && fields[2].empty()) continue;  // a frame without a pose
-    auto odometry = is_whole ? odometry_of(fields) : std::nullopt;
-    if (!odometry || !odometry->T_odom_body.is_finite() || !odometry->T_map_odom.is_finite())
+    auto row = row_of(line);
+    if (!row)
       throw InputError(file.string() + ", line " + std::to_string(number) +
                        ": is no line of odometry.csv as roslam run writes it");
-    result.push_back(*odometry);
+    result.push_back(*std::move(row));
   }
+  return result;
+}
+
+std::vector<Odometry> read_odometry(const std::filesystem::path& file) {
+  std::vector<Odometry> result;
+  for (const OdometryRow& row : read_odometry_rows(file))
+    if (row.odometry) result.push_back(*row.odometry);
   return result;
 }
 

@@ -14,6 +14,7 @@
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/slam/run.hpp"
 #include "roslam/slam/slam.hpp"
+#include "telemetry/mavlink/mavlink_report.hpp"
 
 namespace roslam::recording {
 
@@ -23,6 +24,7 @@ struct RunResults : RunSummary {
   std::map<std::string, std::size_t> saving_faults;  ///< what could not be saved during the run, by message
   std::optional<RemovalTally> removal;               ///< what was removed, where a RemovalLog was kept
   std::optional<DenseMap> dense;                     ///< of Slam::dense_map(), if it was called
+  std::optional<telemetry::MavlinkReport> mavlink;   ///< what an autopilot was sent, with --mavlink
 };
 
 /// The inputs of a run, for its report.

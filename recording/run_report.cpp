@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "recording/mavlink_json.hpp"
 #include "recording/process_info.hpp"
 #include "recording/run_folder.hpp"
 #include "roslam/common/failure.hpp"
@@ -283,6 +284,7 @@ std::string run_report(const Slam& slam, const RunResults& summary, const FrameS
     json["restoration"] = {{"dropped", slam.unrestored()},
                            {"faults", counts_json(slam.restoration_faults())}};
   if (summary.dense) json["dense"] = dense_json(*summary.dense);
+  if (summary.mavlink) json["mavlink"] = mavlink_json(*summary.mavlink);
   json["loops"] = loops_json(slam);
   json["map"] = map_json(slam, description);
   json["keyframes"] = slam.map().keyframe_count();

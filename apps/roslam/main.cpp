@@ -50,6 +50,7 @@ void add_commands(CLI::App& program) {
   roslam::app::add_evaluate_command(program);
   roslam::app::add_map_command(program);
   roslam::app::add_export_command(program);
+  roslam::app::add_telemetry_command(program);
   roslam::app::add_camera_command(program);
   roslam::app::add_vocabulary_command(program);
   roslam::app::add_benchmark_command(program, roslam::kVersion);

@@ -49,10 +49,6 @@ StreamPairingOptions pairing_options(double fps) {
   options.takes_close_at_once = true;
   return options;
 }
-
-void merge(const Counts& counts, Counts& to) {
-  for (const auto& [reason, number] : counts) to[reason] += number;
-}
 }  // namespace
 
 LiveSource::LiveSource(std::unique_ptr<DepthCamera> camera, const LiveSourceOptions& options,
@@ -216,23 +212,14 @@ Frame LiveSource::frame_of(Pairing::Pair images) {
   return frame;
 }
 
-Counts LiveSource::skipped() const {
-  Counts counts = skipped_;
-  merge(pairing_.skipped_colour(), counts);
-  return counts;
-}
+Counts LiveSource::skipped() const { return sum(skipped_, pairing_.skipped_colour()); }
 
 Counts LiveSource::skipped_depth() const {
-  Counts counts = skipped_depth_;
-  merge(pairing_.skipped_depth(), counts);
+  Counts counts = sum(skipped_depth_, pairing_.skipped_depth());
   missing_depth_.add_to(counts);
   return counts;
 }
 
-Counts LiveSource::notes() const {
-  Counts counts = notes_;
-  merge(connection_->notes(), counts);
-  return counts;
-}
+Counts LiveSource::notes() const { return sum(notes_, connection_->notes()); }
 
 }  // namespace roslam

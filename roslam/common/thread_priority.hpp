@@ -22,4 +22,13 @@ inline void lower_thread_priority([[maybe_unused]] ThreadPriority priority) {
 #endif
 }
 
+/// Raises the priority of the calling thread, for one whose work is little and must not be late. Best effort:
+/// does nothing where the user is not permitted to (RLIMIT_NICE, CAP_SYS_NICE).
+inline void raise_thread_priority() {
+#ifdef __linux__
+  constexpr int kNiceness = -10;
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNiceness);
+#endif
+}
+
 }  // namespace roslam

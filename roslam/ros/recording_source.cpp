@@ -14,10 +14,6 @@ namespace roslam {
 namespace {
 constexpr double kRestartSeconds = 1.0;  // by which the clock of true poses goes back
 constexpr std::size_t kMostPoses = 20000;
-
-void add_counts(const std::map<std::string, std::size_t>& counts, std::map<std::string, std::size_t>& to) {
-  for (const auto& [reason, number] : counts) to[reason] += number;
-}
 }  // namespace
 
 RecordingSource::RecordingSource(const std::filesystem::path& path, const RecordingChoice& choice,
@@ -56,14 +52,11 @@ std::optional<Frame> RecordingSource::next() {
 }
 
 std::map<std::string, std::size_t> RecordingSource::skipped() const {
-  auto skipped = skipped_;
-  add_counts(pairing_.skipped_colour(), skipped);
-  return skipped;
+  return sum(skipped_, pairing_.skipped_colour());
 }
 
 std::map<std::string, std::size_t> RecordingSource::skipped_depth() const {
-  auto skipped = skipped_depth_;
-  add_counts(pairing_.skipped_depth(), skipped);
+  auto skipped = sum(skipped_depth_, pairing_.skipped_depth());
   missing_depth_.add_to(skipped);
   return skipped;
 }
@@ -198,7 +191,7 @@ std::map<std::string, std::size_t> RecordingSource::notes() const {
   count(notes, "the clock restarts; a new segment begins there",
         static_cast<std::size_t>(pairing_.restarts()));
   notes.insert(streams_.notes.begin(), streams_.notes.end());
-  for (const auto& [note, number] : recording_->notes()) notes[note] += number;
+  notes = sum(std::move(notes), recording_->notes());
   if (streams_.truth && is_at_end_ && !T_child_camera_)
     ++notes["no ground truth was found in " + streams_.truth->name];
   count(notes, "depth pixel at the end of the sensor's range, taken as unknown", saturated_);

@@ -15,4 +15,10 @@ inline void count(Counts& counts, const std::string& reason, std::size_t number)
   if (number > 0) counts[reason] += number;
 }
 
+/// The events of both.
+inline Counts sum(Counts counts, const Counts& others) {
+  for (const auto& [reason, number] : others) counts[reason] += number;
+  return counts;
+}
+
 }  // namespace roslam

@@ -7,6 +7,7 @@
 
 #include "roslam/common/stopwatch.hpp"
 #include "roslam/options/settings.hpp"
+#include "roslam/sensors/counts.hpp"
 
 namespace roslam {
 
@@ -178,8 +179,7 @@ std::vector<float> FrontEnd::level_scales() const {
 }
 
 std::map<std::string, std::size_t> FrontEnd::faults() const {
-  auto faults = segmentation_.faults();
-  for (const auto& [reason, count] : detector_.faults()) faults[reason] += count;
+  auto faults = sum(segmentation_.faults(), detector_.faults());
   if (detector_.flickers() > 0) faults["labels come and go"] += detector_.flickers();
   return faults;
 }

@@ -53,21 +53,29 @@ void require_poses(const Slam& slam, const RunResults& summary, const FrameSourc
 }
 
 // Tracks every frame and notes what is removed from it.
-RunResults track(FrameSource& source, Slam& slam, FlightLog& flight_log, std::optional<RemovalLog>& log,
-                 bool quiet, const std::stop_token& stop) {
+RunResults track(FrameSource& source, Slam& slam, telemetry::MavlinkSender* mavlink, FlightLog& flight_log,
+                 std::optional<RemovalLog>& log, bool quiet, const std::stop_token& stop) {
   Progress progress(source.size(), quiet);
   double start_up_seconds = -1.0;
   RunResults results;
   static_cast<RunSummary&>(results) = run_slam(
       source, slam,
       [&](const Frame& frame, const FrameResult& result) {
+        if (mavlink) mavlink->add(telemetry::TrackingReport(result));
         flight_log.add(result);
         if (log) log->add(frame, result);
         for (const std::string& warning : result.warnings) progress.print("warning: " + warning);
+        if (mavlink)
+          for (const std::string& warning : mavlink->take_warnings()) progress.print("warning: " + warning);
         if (start_up_seconds < 0.0 && result.T_world_camera) start_up_seconds = process_age();
         progress.show(result.index + 1, name_of(result.state));
       },
       stop);
+  if (mavlink) {
+    mavlink->finish();
+    results.mavlink = mavlink->report();
+    for (const std::string& warning : mavlink->take_warnings()) progress.print("warning: " + warning);
+  }
   if (start_up_seconds >= 0.0) results.start_up_seconds = start_up_seconds;
   return results;
 }
@@ -146,6 +154,7 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   const Mode mode = arguments.real_time || is_live ? Mode::kRealTime : Mode::kDeterministic;
   const auto restorations = std::make_shared<Restorations>();
   flight.slam = open_slam(camera, options, mode, setup_of(arguments, restorations));
+  const auto mavlink = open_mavlink(arguments.mavlink, *flight.slam);
   const RunFolder folder(arguments.out, arguments.overwrite);
   // The recording has the same frames and can be read again.
   flight.description.source = arguments.record.empty() ? arguments.source.name : arguments.record;
@@ -171,7 +180,7 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
   if (!arguments.record.empty()) recorder.emplace(*flight.source, arguments.record);
   // A second signal may end the program before the trajectory is written anew.
   const std::stop_callback flush(stop, [&] { flight_log.flush(); });
-  flight.summary = track(*flight.source, *flight.slam, flight_log, log, arguments.quiet, stop);
+  flight.summary = track(*flight.source, *flight.slam, mavlink.get(), flight_log, log, arguments.quiet, stop);
   // A step that fails must not cost the results of the others.
   std::exception_ptr failure;
   const auto attempt = [&](const auto& step) {

@@ -5,6 +5,7 @@
 #include <stop_token>
 #include <string>
 
+#include "apps/roslam/run/mavlink.hpp"
 #include "apps/roslam/support/sources.hpp"
 #include "recording/run_folder.hpp"
 #include "roslam/slam/run.hpp"
@@ -34,8 +35,9 @@ struct FlightArguments {
   bool restore = false;   ///< write the keyframes without what moves to the folder restored
   std::string models;     ///< folder of the networks that paint, in place of the shipped ones
   InferenceBackend backend = InferenceBackend::kAutomatic;  ///< what runs the networks
-  bool quiet = false;                                       ///< no progress
-  bool overwrite = false;                                   ///< replace files in the folder that no run wrote
+  MavlinkArguments mavlink;
+  bool quiet = false;      ///< no progress
+  bool overwrite = false;  ///< replace files in the folder that no run wrote
 };
 
 /// A flight that came to its end.

@@ -184,6 +184,7 @@ void add_run_command(CLI::App& program, const std::string& version) {
                     "Localise in --map without changing the map");
   add_flight_options(*command, arguments->flight.source);
   add_degrade_option(*command, arguments->flight.source);
+  add_mavlink_options(*command, arguments->flight.mavlink);
   command->add_flag("--print-config", arguments->print_config, "Print the effective options (YAML) and exit");
   command
       ->add_option("--checkpoint", arguments->flight.checkpoint,

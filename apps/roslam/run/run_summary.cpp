@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "recording/mavlink_json.hpp"
+
 namespace roslam::app {
 
 using namespace recording;
@@ -97,6 +99,7 @@ void print_summary(const Flight& flight, const FlightArguments& arguments) {
     std::printf("latency: median %.1f ms, p95 %.1f ms, p99 %.1f ms from the image to its pose\n",
                 found->second.median_ms, found->second.p95_ms, found->second.p99_ms);
   }
+  if (summary.mavlink) std::printf("%s\n", in_words(*summary.mavlink).c_str());
   if (!flight.recorded.empty()) std::printf("%s\n", flight.recorded.c_str());
   std::printf("results: %s\n", arguments.out.c_str());
 }
