@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "apps/roslam/run/view_session.hpp"
 #include "apps/roslam/support/live_camera.hpp"
 #include "apps/roslam/support/named_path.hpp"
 #include "apps/roslam/support/output.hpp"
@@ -54,7 +55,7 @@ void require_poses(const Slam& slam, const RunResults& summary, const FrameSourc
 
 // Tracks every frame and notes what is removed from it.
 RunResults track(FrameSource& source, Slam& slam, FlightLog& flight_log, std::optional<RemovalLog>& log,
-                 bool quiet, const std::stop_token& stop) {
+                 ViewSession* view, bool quiet, const std::stop_token& stop) {
   Progress progress(source.size(), quiet);
   double start_up_seconds = -1.0;
   RunResults results;
@@ -63,6 +64,7 @@ RunResults track(FrameSource& source, Slam& slam, FlightLog& flight_log, std::op
       [&](const Frame& frame, const FrameResult& result) {
         flight_log.add(result);
         if (log) log->add(frame, result);
+        if (view != nullptr) view->add(frame, result);
         for (const std::string& warning : result.warnings) progress.print("warning: " + warning);
         if (start_up_seconds < 0.0 && result.T_world_camera) start_up_seconds = process_age();
         progress.show(result.index + 1, name_of(result.state));
@@ -137,6 +139,7 @@ Options options_of(const FlightArguments& arguments) {
 
 Flight fly(const FlightArguments& arguments, const Options& options, const std::string& version,
            const std::stop_token& stop, const std::stop_token& urgent_stop) {
+  if (arguments.view) ViewSession::require_free(*arguments.view);
   Flight flight;
   flight.source = open_source(arguments.source);
   const Camera& camera = flight.source->camera();
@@ -168,9 +171,15 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
                        *flight.slam);
   std::optional<SourceRecorder> recorder;
   if (!arguments.record.empty()) recorder.emplace(*flight.source, arguments.record);
+  std::optional<ViewSession> view;
+  if (arguments.view)
+    view.emplace(ViewSession::Setup{*arguments.view, flight.description.id, arguments.source.name,
+                                    *flight.slam, *flight.source, stop, [&] { flight_log.save(); }});
   // A second signal may end the program before the trajectory is written anew.
   const std::stop_callback flush(stop, [&] { flight_log.flush(); });
-  flight.summary = track(*flight.source, *flight.slam, flight_log, log, arguments.quiet, stop);
+  flight.summary = track(view ? view->source() : *flight.source, *flight.slam, flight_log, log,
+                         view ? &*view : nullptr, arguments.quiet, view ? view->stop_token() : stop);
+  if (view) view->begin_saving();
   // A step that fails must not cost the results of the others.
   std::exception_ptr failure;
   const auto attempt = [&](const auto& step) {
