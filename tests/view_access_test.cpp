@@ -148,9 +148,9 @@ TEST_F(Page, HasNoFilesButItsOwn) {
 TEST_F(Page, RefusesLongHeadersManyLinesBodiesAndUnknownMethods) {
   EXPECT_EQ(ask(port_, "/", {{"X-Long", std::string(1 << 20U, 'a')}}).status % 431, 0);  // or closed
   Fields many;
-  for (int i = 0; i < 100; ++i) many["X-" + std::to_string(i)] = "a";
+  for (int i = 0; i < 100; ++i) many.emplace("X-" + std::to_string(i), "a");
   EXPECT_EQ(ask(port_, "/", many).status, 431);
-  EXPECT_EQ(ask(port_, "/" + std::string(9000, 'a')).status, 431);
+  EXPECT_EQ(ask(port_, std::string(9000, '/')).status, 431);
   EXPECT_EQ(ask(port_, "/", {{"Content-Length", "5000000000"}}).status, 413);
   EXPECT_EQ(ask(port_, "/save", {{"Transfer-Encoding", "chunked"}}, "POST").status, 413);
   EXPECT_EQ(ask(port_, "/view.js", {{"Range", "bytes=0-1,0-1,0-1"}}).status, 413);

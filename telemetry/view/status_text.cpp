@@ -21,7 +21,8 @@ std::string in_one_line(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-double rounded(double value, double unit) { return std::round(value / unit) * unit; }
+// To so many parts of one: as a decimal number it is short.
+double rounded(double value, double parts) { return std::round(value * parts) / parts; }
 
 std::string with_unit(double value, const char* unit) {
   char text[48];
@@ -37,8 +38,8 @@ Json pose_json(const SE3& pose) {
   const Eigen::Vector3d& p = pose.translation();
   const Eigen::Quaterniond& q = pose.rotation();
   Json json = Json::array();
-  for (const double value : {p.x(), p.y(), p.z()}) json.push_back(rounded(value, 1e-3));
-  for (const double value : {q.w(), q.x(), q.y(), q.z()}) json.push_back(rounded(value, 1e-4));
+  for (const double value : {p.x(), p.y(), p.z()}) json.push_back(rounded(value, 1e3));
+  for (const double value : {q.w(), q.x(), q.y(), q.z()}) json.push_back(rounded(value, 1e4));
   return json;
 }
 }  // namespace
@@ -95,9 +96,9 @@ std::string health_json(const ViewStatus& status) {
                   {"run", status.run},
                   {"phase", name_of(status.phase)},
                   {"state", name_of(status.state)},
-                  {"quality", rounded(status.quality, 1e-3)},
-                  {"latency", rounded(status.latency, 1e-4)},
-                  {"since_frame", rounded(status.since_frame, 1e-3)},
+                  {"quality", rounded(status.quality, 1e3)},
+                  {"latency", rounded(status.latency, 1e4)},
+                  {"since_frame", rounded(status.since_frame, 1e3)},
                   {"frames", status.processed},
                   {"dropped", status.dropped}};
   return in_one_line(json) + "\n";
@@ -153,16 +154,16 @@ std::string event_json(const ViewStatus& status, const ViewCounts& counts) {
             {"state", name_of(status.state)},
             {"health", health.status},
             {"reasons", health.reasons},
-            {"t", rounded(status.timestamp, 1e-3)},
-            {"begun", rounded(status.begun, 1e-3)},
+            {"t", rounded(status.timestamp, 1e3)},
+            {"begun", rounded(status.begun, 1e3)},
             {"frame", status.frame},
             {"frames", status.in_source},
             {"processed", status.processed},
             {"tracked", status.tracked},
             {"dropped", status.dropped},
-            {"fps", rounded(status.fps, 0.1)},
-            {"quality", rounded(status.quality, 1e-3)},
-            {"latency", rounded(status.latency, 1e-4)},
+            {"fps", rounded(status.fps, 10.0)},
+            {"quality", rounded(status.quality, 1e3)},
+            {"latency", rounded(status.latency, 1e4)},
             {"inliers", status.inliers},
             {"keyframes", status.keyframes},
             {"submap", status.submap.is_valid() ? Json(status.submap.value) : Json()},
@@ -183,7 +184,7 @@ std::string log_json(const std::vector<LogEntry>& entries) {
   Json json = Json::array();
   for (const LogEntry& entry : entries)
     json.push_back({{"n", entry.number},
-                    {"t", rounded(entry.timestamp, 1e-3)},
+                    {"t", rounded(entry.timestamp, 1e3)},
                     {"warning", entry.is_warning},
                     {"text", entry.text}});
   return in_one_line(json);
@@ -194,7 +195,7 @@ std::string loops_json(const std::vector<ClosedLoop>& loops) {
   for (const ClosedLoop& loop : loops)
     json.push_back({{"keyframe", loop.keyframe.value},
                     {"matched", loop.matched_keyframe.value},
-                    {"moved", rounded(loop.moved, 1e-3)},
+                    {"moved", rounded(loop.moved, 1e3)},
                     {"merges", loop.merges_submaps}});
   return in_one_line(json);
 }

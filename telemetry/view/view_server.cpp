@@ -93,6 +93,10 @@ ViewServer::Impl::Impl(const Options& the_options, ViewSubject& the_subject)
 }
 
 ViewServer::Impl::~Impl() {
+  {
+    const std::scoped_lock lock(mutex);
+    is_finishing = true;
+  }
   thread.request_stop();
   changed.notify_all();
   http->stop();

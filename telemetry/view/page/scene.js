@@ -40,6 +40,7 @@ export class Scene {
     for (const name of ['keyframes', 'path', 'loops', 'drone', 'grid']) this.batches[name] = this.painter.batch(true);
     this.stale = new Set();
     this.isLost = false;
+    this.shown = '';  // what the last image was drawn from
     this.last = performance.now();
   }
 
@@ -110,10 +111,15 @@ export class Scene {
     this.stale.add('drone');
   }
 
+  // Whether anything was rebuilt.
   rebuild() {
+    const isStale = this.stale.size > 0;
     for (const name of this.stale) this[`rebuild_${name}`]();
     this.stale.clear();
-    for (const chunk of this.chunks.values()) if (chunk.isStale) this.rebuildChunk(chunk);
+    let chunks = 0;
+    for (const chunk of this.chunks.values())
+      if (chunk.isStale && ++chunks <= 8) this.rebuildChunk(chunk);  // the others with the next image
+    return isStale || chunks > 0;
   }
 
   rebuildChunk(chunk) {
@@ -220,13 +226,19 @@ export class Scene {
   }
 
   draw() {
-    const now = performance.now(), seconds = Math.min((now - this.last) / 1000, 0.5);
+    const now = performance.now(), seconds = (now - this.last) / 1000;
+    if (seconds < 0.03) return;  // 30 images a second are enough
     this.last = now;
-    this.rebuild();
+    const isRebuilt = this.rebuild();
     const direction = this.pose ? rotate(this.pose.slice(3), [0, 0, 1]) : [1, 0, 0];
-    this.orbit.follow(this.pose && this.pose.slice(0, 3), direction, this.bounds, seconds);
+    this.orbit.follow(this.pose && this.pose.slice(0, 3), direction, this.bounds, Math.min(seconds, 0.5));
+    const {canvas} = this, matrix = this.orbit.matrix(canvas.clientWidth / canvas.clientHeight);
+    const shown = [...matrix.map((v) => Math.fround(v).toPrecision(5)), canvas.clientWidth, canvas.clientHeight,
+                   ...Object.values(this.layers)].join();
+    if (!isRebuilt && shown === this.shown) return;
+    this.shown = shown;
     const {painter, batches, layers} = this;
-    painter.begin(this.orbit.matrix(this.canvas.clientWidth / this.canvas.clientHeight));
+    painter.begin(matrix);
     const fog = Math.max(this.orbit.distance * 6, 30);
     const dense = [...this.chunks.values()].map((chunk) => chunk.batch).filter((batch) => batch.count);
     const hasDense = layers.dense && dense.length > 0;
