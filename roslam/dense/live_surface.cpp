@@ -14,7 +14,7 @@ namespace roslam {
 namespace {
 using Clock = std::chrono::steady_clock;
 constexpr auto kPatience = std::chrono::seconds(10);  // after the last call of since()
-constexpr float kNear = 0.55F;                        // voxels from the surface
+constexpr float kNear = 0.7F;                         // voxels from the surface
 
 bool is_shown(const Voxel& voxel, const DenseOptions& options, float near) {
   if (!voxel.is_known() || std::abs(voxel.distance()) > near) return false;

@@ -27,13 +27,14 @@ export class Chart {
     pen.clearRect(0, 0, width, height);
     pen.font = '11px system-ui, sans-serif';
     const newest = this.samples[this.samples.length - 1];
-    const slowest = Math.max(50, ...this.samples.map((s) => s.latency));
+    const latencies = this.samples.map((s) => s.latency).sort((a, b) => a - b);
+    const slowest = Math.max(50, 1.2 * (latencies[latencies.length * 0.97 | 0] || 0));
     const worst = Math.max(4, ...this.samples.map((s) => s.drops));
     const row = height / 3, number = (v) => v.toFixed(v < 10 ? 1 : 0);
     this.strip(pen, 0, row, width, 'quality', newest && number(newest.quality * 100) + ' %', '#52c98f',
                (s) => s.quality);
     this.strip(pen, row, row, width, `latency, to ${Math.round(slowest)} ms`, newest && number(newest.latency) + ' ms',
-               '#5cc8ff', (s) => s.latency / slowest);
+               '#5cc8ff', (s) => Math.min(s.latency / slowest, 1));
     this.strip(pen, 2 * row, row, width, 'dropped', newest && String(newest.all), '#e8b866', (s) => s.drops / worst, true);
   }
 

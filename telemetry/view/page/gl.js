@@ -126,7 +126,7 @@ export class Painter {
     const gl = this.gl, {p, uniforms} = this.points;
     gl.useProgram(p);
     gl.uniformMatrix4fv(uniforms.view, false, this.view);
-    gl.uniform1f(uniforms.size, size * this.canvas.height * 0.9);
+    gl.uniform1f(uniforms.size, size * this.canvas.height * 1.07);
     gl.uniform1f(uniforms.least, least * this.ratio);
     gl.uniform1f(uniforms.most, most * this.ratio);
     gl.uniform1f(uniforms.fog, fog);

@@ -186,7 +186,7 @@ export class Scene {
   rebuild_keyframes() {
     const lines = [], size = 0.05 * this.orbit.scale;
     for (const {submap, pose} of this.keyframes.values())
-      if (submap === this.submap) lines.push(...frustum(pose, size, [...COLOURS.keyframe, 150]));
+      if (submap === this.submap) lines.push(...frustum(pose, size, [...COLOURS.keyframe, 95]));
     this.batches.keyframes.fillLines(lines);
   }
 
@@ -242,7 +242,7 @@ export class Scene {
     const fog = Math.max(this.orbit.distance * 6, 30);
     const dense = [...this.chunks.values()].map((chunk) => chunk.batch).filter((batch) => batch.count);
     const hasDense = layers.dense && dense.length > 0;
-    if (hasDense) painter.drawPoints(dense, {size: (this.side || 0.4) / 8 * 1.5, least: 1.3, most: 40, fog});
+    if (hasDense) painter.drawPoints(dense, {size: (this.side || 0.4) / 8 * 1.6, least: 1.6, most: 40, fog});
     if (layers.points)
       painter.drawPoints([batches.points], {size: 0.012 * this.orbit.scale, least: hasDense ? 1.4 : 1.8, most: 7, fog,
                                             isRound: true});
