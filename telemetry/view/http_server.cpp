@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "roslam/common/stopwatch.hpp"
 #include "roslam/common/thread_priority.hpp"
 
 namespace roslam::telemetry {
@@ -134,21 +135,26 @@ class Answerer : public httplib::Server {
 
 struct HttpServer::Impl {
   Impl(const Endpoint& endpoint, HttpHandler the_handler, const Options& the_options)
-      : options(the_options), handler(std::move(the_handler)), gate(endpoint, the_options.gate) {}
+      : options(the_options),
+        handler(std::move(the_handler)),
+        gate(endpoint, the_options.gate),
+        cpu_seconds(static_cast<std::size_t>(the_options.threads)) {}
 
-  void work();
-  void fill(const HttpReply& reply, httplib::Response& response);
+  void work(std::atomic<double>& cpu);
+  void fill(const HttpReply& reply, httplib::Response& response, const std::function<void()>& note_cpu);
 
   Options options;
   HttpHandler handler;
   std::atomic<bool> is_stopped = false;
   RequestGate gate;
+  std::vector<std::atomic<double>> cpu_seconds;  // of each thread
   std::vector<std::jthread> threads;
 };
 
 HttpServer::HttpServer(const Endpoint& endpoint, HttpHandler handler, const Options& options)
     : impl_(std::make_unique<Impl>(endpoint, std::move(handler), options)) {
-  for (int i = 0; i < options.threads; ++i) impl_->threads.emplace_back([this] { impl_->work(); });
+  for (std::atomic<double>& cpu : impl_->cpu_seconds)
+    impl_->threads.emplace_back([this, &cpu] { impl_->work(cpu); });
 }
 
 HttpServer::~HttpServer() { stop(); }
@@ -164,26 +170,30 @@ void HttpServer::stop() {
 
 double HttpServer::cpu_seconds() const {
   double sum = impl_->gate.cpu_seconds();
-  for (std::jthread& thread : impl_->threads) sum += cpu_seconds_of(thread);
+  for (const std::atomic<double>& cpu : impl_->cpu_seconds) sum += cpu;
   return sum;
 }
 
-void HttpServer::Impl::fill(const HttpReply& reply, httplib::Response& response) {
+void HttpServer::Impl::fill(const HttpReply& reply, httplib::Response& response,
+                            const std::function<void()>& note_cpu) {
   response.status = reply.status;
   for (const auto& [name, value] : reply.fields) response.set_header(name.c_str(), value);
   if (!reply.stream) return response.set_content(reply.body, reply.type.c_str());
   response.set_chunked_content_provider(
-      reply.type.c_str(), [this, stream = reply.stream](std::size_t, httplib::DataSink& sink) {
+      reply.type.c_str(), [this, note_cpu, stream = reply.stream](std::size_t, httplib::DataSink& sink) {
         if (is_stopped) return false;
         const bool goes_on =
             stream([&sink](std::string_view part) { return sink.write(part.data(), part.size()); });
+        note_cpu();
         if (!goes_on) sink.done();
         return goes_on;
       });
 }
 
-void HttpServer::Impl::work() {
+void HttpServer::Impl::work(std::atomic<double>& cpu) {
   lower_thread_priority(ThreadPriority::kLow);
+  const Stopwatch watch;
+  const auto note_cpu = [&] { cpu = watch.seconds(); };
   ConnectionStream* stream = nullptr;
   Answerer answerer;
   answerer.set_pre_routing_handler([&](const httplib::Request& request, httplib::Response& response) {
@@ -194,13 +204,14 @@ void HttpServer::Impl::work() {
       reply = HttpReply::text(500, "the server failed");
     }
     if (reply.stream) stream->set_endless();
-    fill(reply, response);
+    fill(reply, response, note_cpu);
     return httplib::Server::HandlerResponse::Handled;
   });
   while (auto connection = gate.next()) {
     ConnectionStream connection_stream(*connection, options, is_stopped);
     stream = &connection_stream;
     if (answerer.answer(connection_stream) && !is_stopped) gate.put_back(std::move(*connection));
+    note_cpu();
   }
 }
 

@@ -5,7 +5,6 @@
 #include <netdb.h>
 #include <netinet/tcp.h>
 #include <poll.h>
-#include <pthread.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -20,6 +19,7 @@
 #include <vector>
 
 #include "roslam/common/error.hpp"
+#include "roslam/common/stopwatch.hpp"
 #include "roslam/common/thread_priority.hpp"
 
 namespace roslam::telemetry {
@@ -113,15 +113,6 @@ void Socket::close() {
   if (fd_ >= 0) ::close(std::exchange(fd_, -1));
 }
 
-double cpu_seconds_of(std::jthread& thread) {
-  clockid_t clock{};
-  timespec time{};
-  if (!thread.joinable() || pthread_getcpuclockid(thread.native_handle(), &clock) != 0 ||
-      clock_gettime(clock, &time) != 0)
-    return 0.0;
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 RequestGate::RequestGate(const Endpoint& endpoint, const GateLimits& limits)
     : limits_(limits),
       listener_(listen_at(endpoint)),
@@ -149,8 +140,6 @@ void RequestGate::close() {
   if (thread_.joinable()) thread_.join();
 }
 
-double RequestGate::cpu_seconds() const { return cpu_seconds_of(const_cast<std::jthread&>(thread_)); }
-
 std::optional<Connection> RequestGate::next() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return is_closed_ || !whole_.empty(); });
@@ -172,6 +161,7 @@ void RequestGate::put_back(Connection connection) {
 void RequestGate::work(const std::stop_token& stop) {
   lower_thread_priority(ThreadPriority::kLow);
   std::vector<pollfd> polled;
+  const Stopwatch watch;
   while (!stop.stop_requested()) {
     polled = {{listener_.fd(), POLLIN, 0}, {wake_.fd(), POLLIN, 0}};
     for (const Connection& connection : waiting_) polled.push_back({connection.socket.fd(), POLLIN, 0});
@@ -187,6 +177,7 @@ void RequestGate::work(const std::stop_token& stop) {
     }
     take_returned();
     if (polled[0].revents != 0) accept_all();
+    cpu_seconds_ = watch.seconds();
   }
   waiting_.clear();
   listener_.close();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -72,7 +73,7 @@ class RequestGate {
   void close();
 
   /// Of the gate's thread, so far.
-  double cpu_seconds() const;
+  double cpu_seconds() const { return cpu_seconds_; }
 
  private:
   void work(const std::stop_token& stop);
@@ -93,10 +94,8 @@ class RequestGate {
   std::deque<Connection> whole_;
   std::list<Connection> returned_;
   bool is_closed_ = false;
+  std::atomic<double> cpu_seconds_ = 0.0;
   std::jthread thread_;
 };
-
-/// Processor time of a thread so far, seconds.
-double cpu_seconds_of(std::jthread& thread);
 
 }  // namespace roslam::telemetry

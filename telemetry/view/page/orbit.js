@@ -44,7 +44,7 @@ export class Orbit {
       }
       const ahead = 0.5 * this.scale;
       const target = [place[0] + ahead * Math.cos(this.heading), place[1] + ahead * Math.sin(this.heading), place[2]];
-      this.move(target, 2.2 * this.scale * this.zoom, share(0.35));
+      this.move(target, 2.7 * this.scale * this.zoom, share(0.35));
     } else if (this.mode === 'above' && bounds) {
       const target = [0, 1, 2].map((i) => (bounds.least[i] + bounds.most[i]) / 2);
       const aspect = innerWidth / innerHeight;

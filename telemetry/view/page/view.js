@@ -183,8 +183,7 @@ async function followLog() {
 async function followImage() {
   for (;;) {
     const begun = performance.now();
-    const isSeen = !document.hidden && !$('picture').hidden && $('picture').offsetParent !== null || $('picture').clientWidth;
-    if (link === 'up' && isSeen && !document.hidden) {
+    if (link === 'up' && !document.hidden && $('picture').clientWidth > 0) {
       try {
         const reply = await fetch(`/frame.jpg?after=${image}`);
         if (reply.status === 200) {
