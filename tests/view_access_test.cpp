@@ -133,6 +133,8 @@ TEST(PageForOthers, NeedsTheTokenForAll) {
       421);
   options.token = "short";
   EXPECT_THROW(ViewServer(options, run), InputError);
+  options.token = "0123456789abcdef\"><script>";
+  EXPECT_THROW(ViewServer(options, run), InputError);
 }
 
 TEST_F(Page, HasNoFilesButItsOwn) {

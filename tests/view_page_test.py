@@ -7,6 +7,7 @@ Usage: view_page_test.py PROGRAM [--seconds N] [--pictures FOLDER]
 Exit code: 0 all is well, 1 not, 77 there is no browser.
 """
 import argparse
+import json
 import os
 import pathlib
 import signal
@@ -19,6 +20,7 @@ import time
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import browser
 
+HOSTILE = "<script>window.hacked=1</script><img src=x onerror='window.hacked=1'>"
 WITHOUT_SERVER = ("ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED_ENCODING", "ERR_CONNECTION_RESET",
                   "ERR_EMPTY_RESPONSE")
 
@@ -38,6 +40,15 @@ def fly(program, folder, port):
 def land(flight):
     flight.send_signal(signal.SIGINT)
     flight.wait(60)
+
+
+def view_hostile(program, folder, port):
+    """Shows a run whose source has a script for a name."""
+    report = json.loads((folder / "run.json").read_text())
+    report["source"] = HOSTILE
+    (folder / "run.json").write_text(json.dumps(report))
+    return subprocess.Popen([program, "view", str(folder), f"127.0.0.1:{port}"], stdout=subprocess.DEVNULL,
+                            stderr=subprocess.DEVNULL)
 
 
 def require(is_so, what):
@@ -109,6 +120,12 @@ def main():
             flight = fly(arguments.program, scratch + "/second", port)
             require(page.wait_for(f"roslam.link === 'up' && roslam.event.run !== '{first}' && "
                                   "roslam.scene.count().path > 2", 120), "another run is taken up by itself")
+            land(flight)
+            flight = view_hostile(arguments.program, pathlib.Path(scratch) / "first", port)
+            require(page.wait_for("roslam.link === 'up' && roslam.event.phase === 'recorded' && "
+                                  "roslam.scene.count().surfaces > 1000", 60), "a run of earlier is shown")
+            require(page.ask("document.querySelector('#source').textContent") == HOSTILE, "names are text")
+            require(page.ask("window.hacked === undefined"), "scripts in names are not run")
             errors = [e for e in page.errors if not any(w in e for w in WITHOUT_SERVER)]
             require(not errors, f"no other errors in the console {errors}")
         finally:

@@ -208,7 +208,7 @@ TEST_F(Page, RefusesAFifthViewerUntilOneLeaves) {
   EXPECT_EQ(fifth.status, 503);
   EXPECT_FALSE(fifth.field("Retry-After").empty());
   EXPECT_EQ(get("/health").status, 200);
-  viewers.pop_back();
+  viewers.pop_back();  // although the state of the run does not change
   for (int i = 0; i < 100 && server_.viewers() == 4; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   EXPECT_EQ(server_.viewers(), 3U);

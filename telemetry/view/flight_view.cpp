@@ -9,7 +9,7 @@
 namespace roslam::telemetry {
 
 namespace {
-constexpr auto kImageInterval = std::chrono::milliseconds(150);
+constexpr auto kImageInterval = std::chrono::milliseconds(200);
 constexpr auto kLooks = std::chrono::seconds(1);  // after the last request for an image
 constexpr std::size_t kLongestLog = 200;
 constexpr std::size_t kMostWarnings = 10;

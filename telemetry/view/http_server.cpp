@@ -30,6 +30,12 @@ class ConnectionStream : public httplib::Stream {
 
   void set_endless() { deadline_ = Clock::time_point::max(); }
 
+  // Whether the other side has closed the connection.
+  bool is_gone() const {
+    pollfd polled{socket(), POLLRDHUP, 0};
+    return poll(&polled, 1, 0) > 0;
+  }
+
   // Versions of httplib differ in which of these they have.
   bool is_readable() const { return !connection_.received.empty(); }
   bool wait_readable() const { return is_readable(); }
@@ -76,14 +82,9 @@ class ConnectionStream : public httplib::Stream {
     constexpr int kStep = 100;
     for (int waited = 0; waited < milliseconds && !stop_; waited += kStep) {
       if (wait_for(POLLOUT, std::min(kStep, milliseconds - waited))) return true;
-      if (is_broken()) return false;
+      if (is_gone()) return false;
     }
     return false;
-  }
-
-  bool is_broken() const {
-    pollfd polled{socket(), 0, 0};
-    return poll(&polled, 1, 0) > 0;
   }
 
   Connection& connection_;
@@ -141,7 +142,8 @@ struct HttpServer::Impl {
         cpu_seconds(static_cast<std::size_t>(the_options.threads)) {}
 
   void work(std::atomic<double>& cpu);
-  void fill(const HttpReply& reply, httplib::Response& response, const std::function<void()>& note_cpu);
+  void fill(const HttpReply& reply, httplib::Response& response, const ConnectionStream& connection,
+            const std::function<void()>& note_cpu);
 
   Options options;
   HttpHandler handler;
@@ -175,13 +177,14 @@ double HttpServer::cpu_seconds() const {
 }
 
 void HttpServer::Impl::fill(const HttpReply& reply, httplib::Response& response,
-                            const std::function<void()>& note_cpu) {
+                            const ConnectionStream& connection, const std::function<void()>& note_cpu) {
   response.status = reply.status;
   for (const auto& [name, value] : reply.fields) response.set_header(name.c_str(), value);
   if (!reply.stream) return response.set_content(reply.body, reply.type.c_str());
   response.set_chunked_content_provider(
-      reply.type.c_str(), [this, note_cpu, stream = reply.stream](std::size_t, httplib::DataSink& sink) {
-        if (is_stopped) return false;
+      reply.type.c_str(),
+      [this, note_cpu, &connection, stream = reply.stream](std::size_t, httplib::DataSink& sink) {
+        if (is_stopped || connection.is_gone()) return false;
         const bool goes_on =
             stream([&sink](std::string_view part) { return sink.write(part.data(), part.size()); });
         note_cpu();
@@ -204,7 +207,7 @@ void HttpServer::Impl::work(std::atomic<double>& cpu) {
       reply = HttpReply::text(500, "the server failed");
     }
     if (reply.stream) stream->set_endless();
-    fill(reply, response, note_cpu);
+    fill(reply, response, *stream, note_cpu);
     return httplib::Server::HandlerResponse::Handled;
   });
   while (auto connection = gate.next()) {

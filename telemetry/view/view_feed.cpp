@@ -11,7 +11,7 @@ namespace roslam::telemetry {
 namespace {
 using Milliseconds = std::chrono::milliseconds;
 constexpr Milliseconds kEventInterval{100};
-constexpr Milliseconds kRepeat{2000};  // of an event where nothing changes, so that pages know of the link
+constexpr Milliseconds kWait{500};          // for an event
 constexpr Milliseconds kMapInterval{1000};  // between two snapshots
 constexpr int kMapShare = 50;               // a snapshot may take a fiftieth of the time between two
 constexpr Milliseconds kInterest{2500};     // after a request for the map
@@ -47,7 +47,7 @@ void ViewFeed::finish() {
 std::string ViewFeed::next_event(std::uint64_t& number, bool& is_last) {
   {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, number > 0 ? kRepeat : Milliseconds(0),
+    changed_.wait_for(lock, number > 0 ? kWait : Milliseconds(0),
                       [&] { return is_finishing_ || event_number_ != number; });
     is_last = is_finishing_;
     const bool is_first = std::exchange(number, std::max<std::uint64_t>(event_number_, 1)) == 0;

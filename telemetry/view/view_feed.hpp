@@ -30,8 +30,9 @@ class ViewFeed {
   void remove_viewer();
   std::size_t viewers() const { return viewers_; }
 
-  /// Waits for an event later than that of the number, two seconds at most, and gives the newest: who reads
-  /// slowly misses some. is_last: the feed ends, and the event tells its last state.
+  /// Waits for an event later than that of the number, half a second at most, and gives the newest: who reads
+  /// slowly misses some. number: then of that event, the same if there is no later one. is_last: the feed
+  /// ends, and the event tells its last state.
   std::string next_event(std::uint64_t& number, bool& is_last);
 
   /// Of the map, not older than a few seconds: waits for the first one.

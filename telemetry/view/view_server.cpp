@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "telemetry/view/view_server.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <charconv>
 #include <utility>
@@ -16,6 +17,7 @@ namespace roslam::telemetry {
 
 namespace {
 constexpr std::size_t kPointsInReply = 100000;  // of surfaces: 0.6 MB
+constexpr int kRepeat = 4;                      // times half a second without an event
 constexpr std::size_t kShortestToken = 16;
 
 constexpr const char* kPolicy =
@@ -29,6 +31,9 @@ T number_in(const HttpRequest& request, const std::string& name, T otherwise = 0
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   return error == std::errc() && end == text.data() + text.size() ? number : otherwise;
 }
+
+// It stands in the page, in cookies and in addresses.
+bool is_plain(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
 std::string binary_type() { return "application/octet-stream"; }
 }  // namespace
@@ -59,8 +64,10 @@ ViewServer::Impl::Impl(const Options& the_options, ViewSubject& the_subject)
       subject(the_subject),
       access(the_options.endpoint.address, the_options.token.empty() ? random_token() : the_options.token),
       feed(the_subject, [this] { return counts(); }) {
-  if (access.token().size() < kShortestToken)
-    throw InputError("ROSLAM_VIEW_TOKEN: has fewer than 16 characters; make one with: openssl rand -hex 16");
+  const std::string& token = access.token();
+  if (token.size() < kShortestToken || !std::all_of(token.begin(), token.end(), is_plain))
+    throw InputError(
+        "ROSLAM_VIEW_TOKEN: is not of 16 or more letters and digits; make one with: openssl rand -hex 16");
   http = std::make_unique<HttpServer>(
       options.endpoint, [this](const HttpRequest& request) { return answer(request); }, options.http);
   running = http.get();
@@ -161,9 +168,13 @@ HttpReply ViewServer::Impl::events() {
   }
   HttpReply reply;
   reply.type = "text/event-stream";
-  reply.stream = [this, place, number = std::uint64_t{0}](const SendPart& send) mutable {
+  reply.stream = [this, place, number = std::uint64_t{0}, repeats = 0](const SendPart& send) mutable {
     bool is_last = false;
+    const std::uint64_t before = number;
     const std::string event = feed.next_event(number, is_last);
+    // Once in a while also where nothing changes, so that pages know of the link.
+    if (number == before && !is_last && ++repeats < kRepeat) return true;
+    repeats = 0;
     const bool is_sent = send("retry: 1000\ndata: " + event + "\n\n");
     if (!is_sent) ++dropped_viewers;
     return is_sent && !is_last;
