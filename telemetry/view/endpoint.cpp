@@ -2,6 +2,8 @@
 #include "telemetry/view/endpoint.hpp"
 
 #include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
 #include <netinet/in.h>
 
 #include <algorithm>
@@ -58,6 +60,23 @@ Endpoint parse_endpoint(const std::string& text) {
 bool is_loopback(const std::string& address) {
   const std::string bare = without_brackets(address);
   return bare == "localhost" || bare == "::1" || (is_numeric(bare) && bare.starts_with("127."));
+}
+
+std::string own_address() {
+  ifaddrs* all = nullptr;
+  std::string result = "127.0.0.1";
+  if (getifaddrs(&all) != 0) return result;
+  for (const ifaddrs* at = all; at != nullptr; at = at->ifa_next) {
+    const bool is_out = (at->ifa_flags & IFF_UP) != 0 && (at->ifa_flags & IFF_LOOPBACK) == 0;
+    if (!is_out || at->ifa_addr == nullptr || at->ifa_addr->sa_family != AF_INET) continue;
+    std::array<char, INET_ADDRSTRLEN> text{};
+    const auto* address = reinterpret_cast<const sockaddr_in*>(at->ifa_addr);
+    if (inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size()) == nullptr) continue;
+    result = text.data();
+    break;
+  }
+  freeifaddrs(all);
+  return result;
 }
 
 bool is_numeric(const std::string& address) {

@@ -19,6 +19,9 @@ Endpoint parse_endpoint(const std::string& text);
 /// Whether only programs of this computer reach that address. In brackets too.
 bool is_loopback(const std::string& address);
 
+/// An address at which others reach this computer, as it seems; 127.0.0.1 if it is in no network.
+std::string own_address();
+
 /// Whether it is an address in digits rather than a name. In brackets too.
 bool is_numeric(const std::string& address);
 

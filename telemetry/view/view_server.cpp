@@ -90,7 +90,7 @@ double ViewServer::cpu_seconds() const { return impl_->counts().cpu_seconds; }
 
 std::string ViewServer::url() const {
   Endpoint shown{impl_->options.endpoint.address, port()};
-  if (shown.address == "0.0.0.0" || shown.address == "::") shown.address = "ADDRESS-OF-THIS-COMPUTER";
+  if (shown.address == "0.0.0.0" || shown.address == "::") shown.address = own_address();
   const std::string page = "http://" + shown.in_words() + "/";
   return impl_->access.needs_token() ? page + "?token=" + token() : page;
 }
