@@ -138,7 +138,7 @@ std::string metrics_text(const ViewStatus& status, const ViewCounts& counts) {
   add("view_viewers", "gauge", "Pages that are open.", count(counts.viewers));
   add("view_viewers_refused_total", "counter", "Pages refused, as there were too many.",
       count(counts.viewers_refused));
-  add("view_viewers_dropped_total", "counter", "Pages that left or were too slow.",
+  add("view_viewers_dropped_total", "counter", "Pages whose events could not be sent.",
       count(counts.viewers_dropped));
   add("view_requests_refused_total", "counter", "Requests refused for their host, origin or token.",
       count(counts.requests_refused));
