@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# Which parts are built: sets ROSLAM_HAS_SEMANTICS, _DENSE, _SIMULATION and _REALSENSE, and writes the version header.
+# Which parts are built: sets ROSLAM_HAS_SEMANTICS, _DENSE, _SIMULATION, _REALSENSE and _VIEW, and writes the version header.
 
 # roslam_component(NAME remedy condition...): whether ROSLAM_<NAME> is built.
 function(roslam_component name remedy)
@@ -27,6 +27,8 @@ roslam_component(SEMANTICS nothing TRUE)
 roslam_component(DENSE liboctomap-dev octomap_FOUND)
 roslam_component(SIMULATION libembree-dev embree_FOUND)
 roslam_component(REALSENSE librealsense2-dev realsense2_FOUND)
+
+roslam_component(VIEW libcpp-httplib-dev ROSLAM_HTTPLIB_FOUND)
 
 # Modules of OpenCV that are optional within the component semantics: ROSLAM_HAS_OPENCV_DNN and ROSLAM_HAS_OPENCV_PHOTO.
 foreach(module dnn photo)

@@ -78,6 +78,7 @@ set(ROSLAM_PUBLIC_HEADERS
   restoration/restored_image.hpp
   dense/dense_map.hpp
   dense/dense_options.hpp
+  dense/live_surface.hpp
   occupancy/occupancy_grid.hpp
   occupancy/occupancy_map.hpp
   dense/surface_file.hpp

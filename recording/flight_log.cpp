@@ -85,6 +85,7 @@ void FlightLog::work(const std::stop_token& stop) {
       std::unique_lock lock(mutex_);
       tick_.wait_for(lock, stop, kFlush, [this] { return wants_flush_; });
       wants_flush_ = false;
+      if (std::exchange(wants_save_, false)) map_due = Clock::now();
       is_path_old = is_path_old_;
     }
     append();
@@ -97,7 +98,7 @@ void FlightLog::work(const std::stop_token& stop) {
     if (now >= map_due) {
       if (settings_.saves_map) attempt([&] { save_map_file(); });
       if (settings_.saves_dense) attempt([&] { save_dense_map(); });
-      map_due = Clock::now() + checkpoint;
+      map_due = settings_.checkpoint > 0.0 ? Clock::now() + checkpoint : Clock::time_point::max();
     }
   }
 }
@@ -163,6 +164,12 @@ void FlightLog::save_dense_map() {
 void FlightLog::flush() {
   const std::scoped_lock lock(mutex_);
   wants_flush_ = true;
+  tick_.notify_all();
+}
+
+void FlightLog::save() {
+  const std::scoped_lock lock(mutex_);
+  wants_flush_ = wants_save_ = true;
   tick_.notify_all();
 }
 

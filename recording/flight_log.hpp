@@ -40,6 +40,9 @@ class FlightLog {
   /// Writes what was added so far at once. May be called from any thread.
   void flush();
 
+  /// Saves the trajectory and the map at once, as at a checkpoint. May be called from any thread.
+  void save();
+
   /// Ends the thread: from now on the trajectory and the map are for the caller to write.
   void stop();
 
@@ -68,6 +71,7 @@ class FlightLog {
   Trajectory poses_;                // likewise, of trajectory.txt
   std::optional<SubmapId> submap_;  // that trajectory.txt is of
   bool wants_flush_ = false;
+  bool wants_save_ = false;
   bool is_path_old_ = false;  // poses in it were withdrawn, or are of another submap
   std::map<std::string, std::size_t> faults_;
   std::jthread thread_;  // last, so that it ends before the members it uses are destroyed

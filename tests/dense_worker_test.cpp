@@ -4,8 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <condition_variable>
+#include <cstdint>
+#include <map>
 #include <mutex>
+#include <vector>
 
 #include "roslam/common/error.hpp"
 #include "tests/restoration_scene.hpp"
@@ -86,6 +90,67 @@ TEST_F(Dense, MapsWhatIsStaticAndKeepsWhatWasRemovedApart) {
   for (const SurfacePoint& point : map.removed) {
     EXPECT_NEAR(point.position.z(), point.colour == cv::Vec3b(0, 0, 255) ? 1.5F : kWallDepth, 1e-4F);
   }
+}
+
+// Points of the changes, placed, and the number of blocks with any.
+std::vector<Eigen::Vector3f> placed(const SurfaceChanges& changes) {
+  std::vector<Eigen::Vector3f> points;
+  for (const auto& block : changes.blocks) {
+    for (const auto& point : block->points) {
+      Eigen::Vector3f place;
+      for (int i = 0; i < 3; ++i)
+        place[i] = static_cast<float>(changes.side) *
+                   (static_cast<float>(block->index[static_cast<std::size_t>(i)]) +
+                    (static_cast<float>(point.position[static_cast<std::size_t>(i)]) + 0.5F) / 256.0F);
+      points.push_back(place);
+    }
+  }
+  return points;
+}
+
+TEST_F(Dense, TellsWhatChangedInTheSurfacesToWhoAsks) {
+  start(Mode::kDeterministic);
+  worker_->submit(KeyframeId{0}, keyframe(false));
+  EXPECT_TRUE(worker_->surface_changes({}, 0, SIZE_MAX).blocks.empty()) << "from now on";
+  worker_->submit(KeyframeId{1}, keyframe(false));
+  const SurfaceChanges all = worker_->surface_changes({}, 0, SIZE_MAX);
+  EXPECT_EQ(all.submap, kHere);
+  EXPECT_TRUE(all.is_all);
+  EXPECT_FALSE(all.has_more);
+  EXPECT_DOUBLE_EQ(all.side, 8 * 0.05);
+  ASSERT_GT(placed(all).size(), 200U);
+  for (const Eigen::Vector3f& point : placed(all)) EXPECT_NEAR(point.z(), kWallDepth, 0.02F);
+  EXPECT_LT(cv::norm(all.blocks.front()->points.front().colour, cv::Vec3b(50, 100, 150)), 3.0);
+  const SurfaceChanges none = worker_->surface_changes(kHere, all.revision, SIZE_MAX);
+  EXPECT_TRUE(none.blocks.empty());
+  EXPECT_FALSE(none.is_all);
+  worker_->submit(KeyframeId{40}, keyframe(false));  // 2 m to the right
+  const SurfaceChanges some = worker_->surface_changes(kHere, all.revision, SIZE_MAX);
+  EXPECT_FALSE(some.is_all);
+  EXPECT_GT(some.blocks.size(), 0U);
+  EXPECT_LT(some.blocks.size(), worker_->surface_changes({}, 0, SIZE_MAX).blocks.size());
+}
+
+TEST_F(Dense, TellsOfSurfacesInPartsAndOfThoseThatAreGone) {
+  start(Mode::kDeterministic);
+  worker_->surface_changes({}, 0, SIZE_MAX);
+  worker_->submit(KeyframeId{0}, keyframe(false));
+  std::map<std::array<std::int32_t, 3>, std::size_t> points;
+  SurfaceChanges part;
+  do {
+    part = worker_->surface_changes(part.submap, part.revision, 100);
+    for (const auto& block : part.blocks) points[block->index] = block->points.size();
+  } while (part.has_more);
+  const SurfaceChanges all = worker_->surface_changes({}, 0, SIZE_MAX);
+  EXPECT_EQ(points.size(), all.blocks.size());
+  for (const auto& block : all.blocks) EXPECT_EQ(points.at(block->index), block->points.size());
+  shift_ = SE3(Eigen::Quaterniond::Identity(), {0.0, 0.0, 4.0});
+  worker_->drain();  // follows the keyframe to where it is now
+  worker_->submit(KeyframeId{1}, keyframe(false));
+  part = worker_->surface_changes(part.submap, part.revision, SIZE_MAX);
+  for (const auto& block : part.blocks) points[block->index] = block->points.size();
+  for (const auto& block : all.blocks) EXPECT_EQ(points.at(block->index), 0U) << "the wall is elsewhere now";
+  for (const Eigen::Vector3f& point : placed(part)) EXPECT_NEAR(point.z(), kWallDepth + 4.0F, 0.02F);
 }
 
 TEST_F(Dense, FusesImagesAsTakenIfToldTo) {

@@ -46,6 +46,7 @@ void add_commands(CLI::App& program) {
   roslam::app::add_compose_command(program);
   roslam::app::add_restore_command(program, roslam::kVersion);
   roslam::app::add_render_command(program);
+  roslam::app::add_view_command(program);
   roslam::app::add_segment_command(program);
   roslam::app::add_evaluate_command(program);
   roslam::app::add_map_command(program);

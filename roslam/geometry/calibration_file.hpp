@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "roslam/common/export.hpp"
 #include "roslam/geometry/se3.hpp"
 
 namespace roslam {
@@ -15,7 +16,7 @@ namespace roslam {
 /// Reads a YAML file, also with the deviations of OpenCV's FileStorage ("%YAML:1.0"), or an XML file of
 /// OpenCV as the same nodes. Throws InputError naming the file; if_missing: the message if it cannot be
 /// opened.
-YAML::Node load_calibration(const std::filesystem::path& file, const std::string& if_missing);
+ROSLAM_EXPORT YAML::Node load_calibration(const std::filesystem::path& file, const std::string& if_missing);
 
 /// The content of an XML file of OpenCV's FileStorage as nodes: elements by name, lists of elements "_" as
 /// sequences, text as scalars. name: of the file, for messages. Throws InputError.
@@ -23,7 +24,7 @@ YAML::Node nodes_of_xml(const std::string& text, const std::string& name);
 
 /// A part of a calibration file: reads values by key. Each function throws InputError that names the file,
 /// its format and the key.
-class CalibrationPart {
+class ROSLAM_EXPORT CalibrationPart {
  public:
   /// name: of the file; format: in words, or empty; both for messages. where: the keys above, for messages.
   CalibrationPart(std::string name, std::string format, YAML::Node node, std::string where = {});
@@ -61,9 +62,9 @@ class CalibrationPart {
 };
 
 /// A matrix as a rigid transform; nothing if it is none, to 0.01, as files state few decimals.
-std::optional<SE3> rigid_transform(const Eigen::Matrix4d& matrix);
+ROSLAM_EXPORT std::optional<SE3> rigid_transform(const Eigen::Matrix4d& matrix);
 
 /// The same of 16 numbers, row by row.
-std::optional<SE3> rigid_transform(const std::vector<double>& values);
+ROSLAM_EXPORT std::optional<SE3> rigid_transform(const std::vector<double>& values);
 
 }  // namespace roslam

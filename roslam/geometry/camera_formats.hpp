@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "roslam/common/export.hpp"
 #include "roslam/geometry/calibration_file.hpp"
 #include "roslam/geometry/camera_import.hpp"
 
@@ -24,13 +25,13 @@ struct AslCamera {
   Camera camera;                     ///< its width is 0 where the file has no image size
   std::optional<SE3> T_body_sensor;  ///< T_BS, if there is one
 };
-AslCamera read_asl_camera(const CalibrationPart& file);
+ROSLAM_EXPORT AslCamera read_asl_camera(const CalibrationPart& file);
 
 /// The inertial unit of such a data set: its noise and, unless it is the body, as in EuRoC, its pose.
-ImuCalibration read_asl_unit(const CalibrationPart& file, const SE3& T_camera_body);
+ROSLAM_EXPORT ImuCalibration read_asl_unit(const CalibrationPart& file, const SE3& T_camera_body);
 
 /// Sets the lens by the name that another program has for its model. Fails for an unknown one.
-void set_lens(Camera& camera, const CalibrationPart& file, std::string_view model,
-              std::vector<double> coefficients);
+ROSLAM_EXPORT void set_lens(Camera& camera, const CalibrationPart& file, std::string_view model,
+                            std::vector<double> coefficients);
 
 }  // namespace roslam

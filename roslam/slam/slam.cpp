@@ -119,6 +119,10 @@ std::shared_ptr<const OccupancyGrid> Slam::occupancy() const {
   return impl_->dense ? impl_->dense->occupancy() : nullptr;
 }
 
+SurfaceChanges Slam::surface_changes(SubmapId submap, std::uint64_t revision, std::size_t most_points) const {
+  return impl_->dense ? impl_->dense->surface_changes(submap, revision, most_points) : SurfaceChanges{};
+}
+
 std::optional<DenseMap> Slam::dense_map(const std::stop_token& stop) const {
   if (!impl_->dense) return std::nullopt;
   return impl_->dense->result(main_submap(), stop);

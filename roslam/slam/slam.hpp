@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "roslam/common/export.hpp"
 #include "roslam/common/stage_times.hpp"
 #include "roslam/dense/dense_map.hpp"
+#include "roslam/dense/live_surface.hpp"
 #include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/trajectory.hpp"
 #include "roslam/loop_closing/closed_loop.hpp"
@@ -131,6 +133,12 @@ class ROSLAM_EXPORT Slam {
   /// so that the first returns null, as all do where no dense map is made. OccupancyGrid::timestamp() says
   /// how old it is. May be called from any thread.
   std::shared_ptr<const OccupancyGrid> occupancy() const;
+
+  /// What changed in the surfaces of the dense map since a revision of a submap, both as the call before
+  /// gave them, for displays: of most_points at most, unless it is one block. They are kept up while somebody
+  /// asks at least every ten seconds, from one keyframe to the next. May be called from any thread.
+  SurfaceChanges surface_changes(SubmapId submap = {}, std::uint64_t revision = 0,
+                                 std::size_t most_points = SIZE_MAX) const;
 
   /// The dense map of the main submap; nothing if none is made, or if stop was requested before it was
   /// extracted.

@@ -51,7 +51,8 @@ struct DenseWorker::Impl {
   std::map<KeyframeId, KeyframePose> poses_of(const std::vector<KeyframeId>& ids) const;
   void follow(double share);
   void add_occupancy(SubmapId submap, DenseMap& map) const;
-  void keep_occupancy(StageTimes& times);
+  void keep_up(StageTimes& times);
+  void keep_occupancy(const DenseChanges& changes, SubmapId submap, StageTimes& times);
   void make_checkpoint(StageTimes& times);
   std::optional<DenseMap> map_of(SubmapId submap, const std::function<bool()>& should_stop) const;
 
@@ -69,8 +70,10 @@ struct DenseWorker::Impl {
   std::size_t since_followed_ = 0;  // keyframes
   std::size_t moved_ = 0;
   LiveOccupancy live_occupancy_;
-  KeyframeId newest_;              // that was fused
-  double newest_timestamp_ = 0.0;  // seconds
+  bool keeps_occupancy_ = false, keeps_surface_ = false;  // since the keyframe before
+  LiveSurface live_surface_;                              // may be used by all threads
+  KeyframeId newest_;                                     // that was fused
+  double newest_timestamp_ = 0.0;                         // seconds
 
   std::atomic<bool> is_corrected_ = false;  // as a whole, since the map was followed
 
@@ -148,7 +151,7 @@ void DenseWorker::Impl::work(KeyframeId keyframe, const KeyframeWorker::ShouldSt
     }
     newest_ = keyframe;
     newest_timestamp_ = job->input.frame.timestamp;
-    keep_occupancy(times);
+    keep_up(times);
     make_checkpoint(times);
   } catch (const std::exception& error) {
     jobs_.note_fault(error);
@@ -194,20 +197,38 @@ std::vector<DenseWorker::Impl::RemovedPoint> DenseWorker::Impl::removed_points(c
   return result;
 }
 
-// From when somebody has asked for it.
-void DenseWorker::Impl::keep_occupancy(StageTimes& times) {
+// Tells what somebody has asked for of what changed. Who asks anew is told all.
+void DenseWorker::Impl::keep_up(StageTimes& times) {
+  bool wants_occupancy = false;
   {
     const std::scoped_lock lock(mutex_);
-    if (!wants_occupancy_) return;
+    wants_occupancy = wants_occupancy_;
   }
-  const Stopwatch watch;
+  const bool wants_surface = live_surface_.is_wanted();
+  if (wants_occupancy != keeps_occupancy_ || wants_surface != keeps_surface_) mapper_.restart_changes();
+  keeps_occupancy_ = wants_occupancy;
+  keeps_surface_ = wants_surface;
+  if (!wants_surface) live_surface_.clear();
+  if (!wants_occupancy && !wants_surface) return;
   try {
-    live_occupancy_.update(mapper_, mapper_.take_changes());
+    const Stopwatch watch;
+    const SubmapId submap = pose_lookup_({newest_}).front().submap;
+    const DenseChanges changes = mapper_.take_changes();
+    if (wants_surface) {
+      live_surface_.update(mapper_, changes, options_, submap);
+      times.add("dense.surface", watch.seconds());
+    }
+    if (wants_occupancy) keep_occupancy(changes, submap, times);
   } catch (...) {
     mapper_.restart_changes();  // what was taken is lost
     throw;
   }
-  auto grid = live_occupancy_.grid(pose_lookup_({newest_}).front().submap, newest_timestamp_);
+}
+
+void DenseWorker::Impl::keep_occupancy(const DenseChanges& changes, SubmapId submap, StageTimes& times) {
+  const Stopwatch watch;
+  live_occupancy_.update(mapper_, changes);
+  auto grid = live_occupancy_.grid(submap, newest_timestamp_);
   times.add("dense.occupancy", watch.seconds());
   const std::scoped_lock lock(mutex_);
   if (grid) occupancy_ = std::move(grid);
@@ -252,6 +273,11 @@ std::shared_ptr<const OccupancyGrid> DenseWorker::occupancy() {
   const std::scoped_lock lock(impl_->mutex_);
   impl_->wants_occupancy_ = true;
   return impl_->occupancy_;
+}
+
+SurfaceChanges DenseWorker::surface_changes(SubmapId submap, std::uint64_t revision,
+                                            std::size_t most_points) {
+  return impl_->live_surface_.since(submap, revision, most_points);
 }
 
 std::shared_ptr<const DenseMap> DenseWorker::checkpoint(SubmapId submap) {

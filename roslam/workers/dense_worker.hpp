@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -8,6 +10,7 @@
 
 #include "roslam/common/stage_times.hpp"
 #include "roslam/dense/dense_map.hpp"
+#include "roslam/dense/live_surface.hpp"
 #include "roslam/dynamic_objects/dynamic_objects.hpp"
 #include "roslam/map/ids.hpp"
 #include "roslam/map/keyframe_pose.hpp"
@@ -61,6 +64,10 @@ class DenseWorker {
   /// The occupancy of the submap of the keyframe that was fused last, kept up from the first call on; null
   /// before the next keyframe. May be called from any thread.
   std::shared_ptr<const OccupancyGrid> occupancy();
+
+  /// What changed in the surfaces since that revision of that submap, for displays; kept up from one keyframe
+  /// to the next while somebody asks. May be called from any thread.
+  SurfaceChanges surface_changes(SubmapId submap, std::uint64_t revision, std::size_t most_points);
 
   /// The map that the call before asked for, made when the next keyframe was fused, and asks for one of this
   /// submap; null if it is not made yet or none was asked for. Without occupancy. May be called from any

@@ -19,6 +19,7 @@ void DenseWorker::follow_soon() {}
 void DenseWorker::drain() {}
 void DenseWorker::cancel() {}
 std::shared_ptr<const OccupancyGrid> DenseWorker::occupancy() { return nullptr; }
+SurfaceChanges DenseWorker::surface_changes(SubmapId, std::uint64_t, std::size_t) { return {}; }
 std::shared_ptr<const DenseMap> DenseWorker::checkpoint(SubmapId) { return nullptr; }
 std::optional<DenseMap> DenseWorker::result(SubmapId, const std::stop_token&) const { return std::nullopt; }
 StageTimes DenseWorker::times() const { return {}; }

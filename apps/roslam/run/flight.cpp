@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "apps/roslam/run/view_session.hpp"
 #include "apps/roslam/support/live_camera.hpp"
 #include "apps/roslam/support/named_path.hpp"
 #include "apps/roslam/support/output.hpp"
@@ -52,29 +53,39 @@ void require_poses(const Slam& slam, const RunResults& summary, const FrameSourc
                    " corners of known depth: check the images and depth_units_per_metre of the camera");
 }
 
-// Tracks every frame and notes what is removed from it.
-RunResults track(FrameSource& source, Slam& slam, telemetry::MavlinkSender* mavlink, FlightLog& flight_log,
-                 std::optional<RemovalLog>& log, bool quiet, const std::stop_token& stop) {
+// What takes each frame and its result; null or empty: nothing.
+struct Listeners {
+  telemetry::MavlinkSender* mavlink;
+  FlightLog& flight_log;
+  std::optional<RemovalLog>& removal_log;
+  ViewSession* view;
+};
+
+// Tracks every frame and tells the listeners.
+RunResults track(FrameSource& source, Slam& slam, const Listeners& to, bool quiet,
+                 const std::stop_token& stop) {
   Progress progress(source.size(), quiet);
   double start_up_seconds = -1.0;
   RunResults results;
   static_cast<RunSummary&>(results) = run_slam(
       source, slam,
       [&](const Frame& frame, const FrameResult& result) {
-        if (mavlink) mavlink->add(telemetry::TrackingReport(result));
-        flight_log.add(result);
-        if (log) log->add(frame, result);
+        if (to.mavlink != nullptr) to.mavlink->add(telemetry::TrackingReport(result));
+        to.flight_log.add(result);
+        if (to.removal_log) to.removal_log->add(frame, result);
+        if (to.view != nullptr) to.view->add(frame, result);
         for (const std::string& warning : result.warnings) progress.print("warning: " + warning);
-        if (mavlink)
-          for (const std::string& warning : mavlink->take_warnings()) progress.print("warning: " + warning);
+        if (to.mavlink != nullptr)
+          for (const std::string& warning : to.mavlink->take_warnings())
+            progress.print("warning: " + warning);
         if (start_up_seconds < 0.0 && result.T_world_camera) start_up_seconds = process_age();
         progress.show(result.index + 1, name_of(result.state));
       },
       stop);
-  if (mavlink) {
-    mavlink->finish();
-    results.mavlink = mavlink->report();
-    for (const std::string& warning : mavlink->take_warnings()) progress.print("warning: " + warning);
+  if (to.mavlink != nullptr) {
+    to.mavlink->finish();
+    results.mavlink = to.mavlink->report();
+    for (const std::string& warning : to.mavlink->take_warnings()) progress.print("warning: " + warning);
   }
   if (start_up_seconds >= 0.0) results.start_up_seconds = start_up_seconds;
   return results;
@@ -145,6 +156,7 @@ Options options_of(const FlightArguments& arguments) {
 
 Flight fly(const FlightArguments& arguments, const Options& options, const std::string& version,
            const std::stop_token& stop, const std::stop_token& urgent_stop) {
+  if (arguments.view) ViewSession::require_free(*arguments.view);
   Flight flight;
   flight.source = open_source(arguments.source);
   const Camera& camera = flight.source->camera();
@@ -178,9 +190,16 @@ Flight fly(const FlightArguments& arguments, const Options& options, const std::
                        *flight.slam);
   std::optional<SourceRecorder> recorder;
   if (!arguments.record.empty()) recorder.emplace(*flight.source, arguments.record);
+  std::optional<ViewSession> view;
+  if (arguments.view)
+    view.emplace(ViewSession::Setup{*arguments.view, flight.description.id, arguments.source.name,
+                                    *flight.slam, *flight.source, stop, [&] { flight_log.save(); }});
   // A second signal may end the program before the trajectory is written anew.
   const std::stop_callback flush(stop, [&] { flight_log.flush(); });
-  flight.summary = track(*flight.source, *flight.slam, mavlink.get(), flight_log, log, arguments.quiet, stop);
+  const Listeners listeners{mavlink.get(), flight_log, log, view ? &*view : nullptr};
+  flight.summary = track(view ? view->source() : *flight.source, *flight.slam, listeners, arguments.quiet,
+                         view ? view->stop_token() : stop);
+  if (view) view->begin_saving();
   // A step that fails must not cost the results of the others.
   std::exception_ptr failure;
   const auto attempt = [&](const auto& step) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 
@@ -31,9 +32,10 @@ struct FlightArguments {
   bool checkpoint_dense = false;  ///< save the dense map with each of them as well
   double checkpoint = 30.0;       ///< seconds between two saved maps; 0: none before the end
   bool video = false;
-  bool no_dense = false;  ///< make no dense map
-  bool restore = false;   ///< write the keyframes without what moves to the folder restored
-  std::string models;     ///< folder of the networks that paint, in place of the shipped ones
+  std::optional<std::string> view;  ///< address and port of the web page; nothing: none
+  bool no_dense = false;            ///< make no dense map
+  bool restore = false;             ///< write the keyframes without what moves to the folder restored
+  std::string models;               ///< folder of the networks that paint, in place of the shipped ones
   InferenceBackend backend = InferenceBackend::kAutomatic;  ///< what runs the networks
   MavlinkArguments mavlink;
   bool quiet = false;      ///< no progress

@@ -193,6 +193,12 @@ void add_run_command(CLI::App& program, const std::string& version) {
       ->capture_default_str();
   command->add_flag("--checkpoint-dense", arguments->flight.checkpoint_dense,
                     "Save the dense map (dense.ply) as often, as it was one --checkpoint before");
+  command
+      ->add_option("--view", arguments->flight.view,
+                   "Show the run on a web page at ADDRESS:PORT, default 127.0.0.1:8080 (this computer only); "
+                   "at another "
+                   "address the page needs the token in the URL that is printed")
+      ->expected(0, 1);
   command->add_flag("--video", arguments->flight.video,
                     "Write removal.avi too: each frame with kept and removed points");
   command->add_flag("--no-dense", arguments->flight.no_dense,

@@ -35,6 +35,7 @@ void add_map_command(CLI::App& program);
 void add_export_command(CLI::App& program);
 void add_camera_command(CLI::App& program);
 void add_telemetry_command(CLI::App& program);
+void add_view_command(CLI::App& program);
 void add_vocabulary_command(CLI::App& program);
 void add_benchmark_command(CLI::App& program, const std::string& version);
 
