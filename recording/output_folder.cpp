@@ -34,15 +34,10 @@ bool is_file_or_folder(const fs::path& path) {
 
 FolderLock::FolderLock(const fs::path& folder) {
   make_folder(folder);
-  descriptor_ = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor_ < 0 || flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
-  close(descriptor_);
+  descriptor_ = FileDescriptor(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!descriptor_ || flock(descriptor_.get(), LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
   throw OutputError(folder.string() +
                     ": another roslam writes to this folder; wait for it or choose another --out");
-}
-
-FolderLock::~FolderLock() {
-  if (descriptor_ >= 0) close(descriptor_);
 }
 
 OutputFolder::OutputFolder(const fs::path& path, const std::string& command,

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "roslam/common/file_descriptor.hpp"
+
 namespace roslam::recording {
 
 /// Exclusive use of a folder among processes of this program, until it is destroyed or the process ends,
@@ -15,12 +17,9 @@ class FolderLock {
   /// Creates the folder if it does not exist. Throws OutputError if that fails or if another process holds
   /// it. On file systems without locks it holds nothing.
   explicit FolderLock(const std::filesystem::path& folder);
-  ~FolderLock();
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
 
  private:
-  int descriptor_ = -1;
+  FileDescriptor descriptor_;
 };
 
 /// False for a device, a pipe and what does not exist.

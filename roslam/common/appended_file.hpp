@@ -7,21 +7,20 @@
 #include <string_view>
 
 #include "roslam/common/export.hpp"
+#include "roslam/common/file_descriptor.hpp"
 
 namespace roslam {
 
-/// A text file that grows by whole lines and survives a program that is killed, a power cut and a full disk:
-/// what was appended is flushed to the disk, and of lines that do not fit nothing stays. Not thread safe.
+/// A file that grows by whole pieces, such as lines of a text or chunks of a recording, and survives a
+/// program that is killed and a full disk: of a piece that does not fit nothing stays. A power cut costs what
+/// was appended since sync(). Not thread safe.
 class ROSLAM_EXPORT AppendedFile {
  public:
-  /// Makes the file with its first line, in place of an older one. Throws OutputError.
+  /// Makes the file with its first piece, in place of an older one. Throws OutputError.
   AppendedFile(std::filesystem::path file, std::string_view header);
-  ~AppendedFile();
-  AppendedFile(const AppendedFile&) = delete;
-  AppendedFile& operator=(const AppendedFile&) = delete;
 
-  /// Appends lines. Returns false if they cannot be written now; the file is as before then.
-  bool append(std::string_view lines);
+  /// Appends a piece. Returns false if it cannot be written now; the file is as before then.
+  bool append(std::string_view bytes);
 
   /// Waits until what was appended is on the disk. Returns false if the disk refused it.
   bool sync();
@@ -35,7 +34,7 @@ class ROSLAM_EXPORT AppendedFile {
   void open();
 
   std::filesystem::path file_;
-  int descriptor_ = -1;
+  FileDescriptor descriptor_;
   std::size_t size_ = 0;  // bytes that are surely there
 };
 

@@ -36,8 +36,8 @@ std::int64_t nanoseconds_of(double seconds) {
     throw InputError("a time stamp that cannot be: " + std::to_string(seconds) + " s");
   const double whole = std::floor(std::abs(seconds));
   std::array<char, 400> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), std::abs(seconds),
-                                 std::chars_format::fixed);
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), std::abs(seconds), std::chars_format::fixed);
   const std::string_view digits(text.data(), static_cast<std::size_t>(end.ptr - text.data()));
   const std::size_t point = digits.find('.');
   std::string decimals(point == std::string_view::npos ? std::string_view() : digits.substr(point + 1));

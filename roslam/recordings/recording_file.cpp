@@ -13,22 +13,15 @@
 
 namespace roslam {
 
-RecordingFile::RecordingFile(const std::filesystem::path& path) : name_(path.string()) {
-  descriptor_ = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+RecordingFile::RecordingFile(const std::filesystem::path& path)
+    : name_(path.string()), descriptor_(open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
   struct stat status {};
-  if (descriptor_ < 0 || fstat(descriptor_, &status) != 0) {
-    const std::string why = std::generic_category().message(errno);
-    if (descriptor_ >= 0) close(descriptor_);
-    throw InputError(name_ + ": cannot be opened (" + why + "); give the path of a recording");
-  }
-  if (!S_ISREG(status.st_mode)) {
-    close(descriptor_);
-    throw InputError(name_ + ": not a file; give the path of a recording");
-  }
+  if (!descriptor_ || fstat(descriptor_.get(), &status) != 0)
+    throw InputError(name_ + ": cannot be opened (" + std::generic_category().message(errno) +
+                     "); give the path of a recording");
+  if (!S_ISREG(status.st_mode)) throw InputError(name_ + ": not a file; give the path of a recording");
   size_ = static_cast<std::uint64_t>(status.st_size);
 }
-
-RecordingFile::~RecordingFile() { close(descriptor_); }
 
 ByteSpan RecordingFile::view(std::uint64_t offset, std::size_t count) {
   if (offset >= size_) return {};
@@ -46,7 +39,7 @@ ByteSpan RecordingFile::view(std::uint64_t offset, std::size_t count) {
 
 void RecordingFile::read(std::uint64_t offset, std::span<std::uint8_t> into) const {
   while (!into.empty()) {
-    const ssize_t count = pread(descriptor_, into.data(), into.size(), static_cast<off_t>(offset));
+    const ssize_t count = pread(descriptor_.get(), into.data(), into.size(), static_cast<off_t>(offset));
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) throw InputError(name_ + ": cannot be read to its end; check the disk");
     into = into.subspan(static_cast<std::size_t>(count));

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "roslam/common/binary.hpp"
+#include "roslam/common/file_descriptor.hpp"
 
 namespace roslam {
 
@@ -86,9 +87,6 @@ class RecordingFile {
  public:
   /// Throws InputError if the file is missing or cannot be read.
   explicit RecordingFile(const std::filesystem::path& path);
-  ~RecordingFile();
-  RecordingFile(const RecordingFile&) = delete;
-  RecordingFile& operator=(const RecordingFile&) = delete;
 
   /// Bytes of the file, valid until the next call; fewer at its end. count: at most kWindow. Throws
   /// InputError.
@@ -105,7 +103,7 @@ class RecordingFile {
 
  private:
   std::string name_;
-  int descriptor_ = -1;
+  FileDescriptor descriptor_;
   std::uint64_t size_ = 0;
   std::vector<std::uint8_t> window_;
   std::uint64_t window_begin_ = 0;

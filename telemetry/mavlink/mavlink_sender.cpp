@@ -14,9 +14,9 @@
 #include <thread>
 
 #include "roslam/common/error.hpp"
+#include "roslam/common/file_descriptor.hpp"
 #include "roslam/common/thread_priority.hpp"
 #include "telemetry/mavlink/autopilot_watch.hpp"
-#include "telemetry/mavlink/file_descriptor.hpp"
 
 namespace roslam::telemetry {
 

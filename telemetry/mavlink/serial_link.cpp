@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "roslam/common/error.hpp"
-#include "telemetry/mavlink/file_descriptor.hpp"
+#include "roslam/common/file_descriptor.hpp"
 #include "telemetry/mavlink/links.hpp"
 #include "telemetry/mavlink/mavlink_frame.hpp"
 

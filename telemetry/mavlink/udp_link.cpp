@@ -8,7 +8,7 @@
 #include <system_error>
 
 #include "roslam/common/error.hpp"
-#include "telemetry/mavlink/file_descriptor.hpp"
+#include "roslam/common/file_descriptor.hpp"
 #include "telemetry/mavlink/links.hpp"
 
 namespace roslam::telemetry {

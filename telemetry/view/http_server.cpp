@@ -43,7 +43,7 @@ class ConnectionStream : public httplib::Stream {
   bool wait_writable() const { return wait_for(POLLOUT, static_cast<int>(options_.send_time.count())); }
   bool is_peer_alive() const { return is_writable(); }
   time_t duration() const { return 0; }
-  socket_t socket() const { return connection_.socket.fd(); }
+  socket_t socket() const { return connection_.socket.get(); }
   void get_remote_ip_and_port(std::string& ip, int& port) const {
     ip.clear();
     port = 0;

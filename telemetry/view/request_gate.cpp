@@ -42,7 +42,7 @@ constexpr std::string_view kEndOfHeader = "\r\n\r\n";
   throw InputError(at + "cannot listen there: " + std::strerror(error));
 }
 
-Socket listen_at(const Endpoint& endpoint) {
+FileDescriptor listen_at(const Endpoint& endpoint) {
   addrinfo hints{};
   hints.ai_family = AF_UNSPEC;
   hints.ai_socktype = SOCK_STREAM;
@@ -55,21 +55,21 @@ Socket listen_at(const Endpoint& endpoint) {
     throw InputError("--view " + endpoint.in_words() + ": no such address (" + gai_strerror(code) + ")");
   int error = 0;
   for (const addrinfo* at = found; at != nullptr; at = at->ai_next) {
-    Socket socket(::socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, at->ai_protocol));
+    FileDescriptor socket(
+        ::socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, at->ai_protocol));
     const int on = 1;  // not SO_REUSEPORT, with which a second program could take the same port
-    setsockopt(socket.fd(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (socket.fd() >= 0 && bind(socket.fd(), at->ai_addr, at->ai_addrlen) == 0 &&
-        listen(socket.fd(), 64) == 0)
+    setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    if (socket && bind(socket.get(), at->ai_addr, at->ai_addrlen) == 0 && listen(socket.get(), 64) == 0)
       return socket;
     error = errno;
   }
   fail(endpoint, error);
 }
 
-int port_of(const Socket& listener) {
+int port_of(const FileDescriptor& listener) {
   sockaddr_storage address{};
   socklen_t size = sizeof address;
-  getsockname(listener.fd(), reinterpret_cast<sockaddr*>(&address), &size);
+  getsockname(listener.get(), reinterpret_cast<sockaddr*>(&address), &size);
   std::array<char, NI_MAXSERV> port{};
   getnameinfo(reinterpret_cast<sockaddr*>(&address), size, nullptr, 0, port.data(), port.size(),
               NI_NUMERICSERV);
@@ -82,8 +82,8 @@ void refuse(const Connection& connection, std::string_view status) {
                             "\r\nContent-Type: text/plain\r\nConnection: close\r\n"
                             "X-Content-Type-Options: nosniff\r\nContent-Length: 0\r\n\r\n";
   [[maybe_unused]] const auto sent =
-      send(connection.socket.fd(), reply.data(), reply.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-  shutdown(connection.socket.fd(), SHUT_WR);
+      send(connection.socket.get(), reply.data(), reply.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  shutdown(connection.socket.get(), SHUT_WR);
 }
 
 // Fields that no request of the page has and that would make the answer larger, or the request.
@@ -103,16 +103,6 @@ bool has_refused_field(std::string_view header) {
 }
 }  // namespace
 
-Socket& Socket::operator=(Socket&& other) noexcept {
-  close();
-  fd_ = std::exchange(other.fd_, -1);
-  return *this;
-}
-
-void Socket::close() {
-  if (fd_ >= 0) ::close(std::exchange(fd_, -1));
-}
-
 RequestGate::RequestGate(const Endpoint& endpoint, const GateLimits& limits)
     : limits_(limits),
       listener_(listen_at(endpoint)),
@@ -122,10 +112,7 @@ RequestGate::RequestGate(const Endpoint& endpoint, const GateLimits& limits)
 
 RequestGate::~RequestGate() { close(); }
 
-void RequestGate::wake() {
-  const std::uint64_t one = 1;
-  [[maybe_unused]] const auto written = write(wake_.fd(), &one, sizeof one);
-}
+void RequestGate::wake() { eventfd_write(wake_.get(), 1); }
 
 void RequestGate::close() {
   {
@@ -163,11 +150,11 @@ void RequestGate::work(const std::stop_token& stop) {
   std::vector<pollfd> polled;
   const Stopwatch watch;
   while (!stop.stop_requested()) {
-    polled = {{listener_.fd(), POLLIN, 0}, {wake_.fd(), POLLIN, 0}};
-    for (const Connection& connection : waiting_) polled.push_back({connection.socket.fd(), POLLIN, 0});
+    polled = {{listener_.get(), POLLIN, 0}, {wake_.get(), POLLIN, 0}};
+    for (const Connection& connection : waiting_) polled.push_back({connection.socket.get(), POLLIN, 0});
     if (poll(polled.data(), polled.size(), wait_time()) < 0 && errno != EINTR) break;
-    std::uint64_t count = 0;
-    [[maybe_unused]] const auto read_bytes = read(wake_.fd(), &count, sizeof count);
+    eventfd_t count = 0;
+    eventfd_read(wake_.get(), &count);
     const auto now = Clock::now();
     auto at = waiting_.begin();
     for (std::size_t i = 2; i < polled.size(); ++i) {
@@ -180,7 +167,7 @@ void RequestGate::work(const std::stop_token& stop) {
     cpu_seconds_ = watch.seconds();
   }
   waiting_.clear();
-  listener_.close();
+  listener_.reset();
 }
 
 // Milliseconds to the first deadline; -1: there is none.
@@ -194,14 +181,14 @@ int RequestGate::wait_time() const {
 
 void RequestGate::accept_all() {
   for (;;) {
-    Socket socket(accept4(listener_.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
-    if (socket.fd() < 0) {
+    FileDescriptor socket(accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    if (!socket) {
       // Out of descriptors: the waiting ones are worth less than the flight's files.
       if ((errno == EMFILE || errno == ENFILE) && !waiting_.empty()) waiting_.pop_front();
       return;
     }
     const int on = 1;
-    setsockopt(socket.fd(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    setsockopt(socket.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     if (waiting_.size() >= limits_.connections) waiting_.pop_front();
     waiting_.push_back({std::move(socket), {}, Clock::now() + limits_.header_time});
   }
@@ -210,7 +197,7 @@ void RequestGate::accept_all() {
 // False: the connection is not for the gate any more.
 bool RequestGate::receive(Connection& connection) {
   std::array<char, 4096> bytes;
-  const auto size = recv(connection.socket.fd(), bytes.data(), bytes.size(), 0);
+  const auto size = recv(connection.socket.get(), bytes.data(), bytes.size(), 0);
   if (size < 0) return errno == EAGAIN || errno == EINTR;
   if (size == 0) return false;
   if (connection.received.empty()) connection.deadline = Clock::now() + limits_.header_time;

@@ -12,31 +12,15 @@
 #include <optional>
 #include <string>
 #include <thread>
-#include <utility>
 
+#include "roslam/common/file_descriptor.hpp"
 #include "telemetry/view/endpoint.hpp"
 
 namespace roslam::telemetry {
 
-/// A file descriptor that is closed with its owner.
-class Socket {
- public:
-  Socket() = default;
-  explicit Socket(int fd) : fd_(fd) {}
-  Socket(Socket&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Socket& operator=(Socket&& other) noexcept;
-  ~Socket() { close(); }
-
-  void close();
-  int fd() const { return fd_; }
-
- private:
-  int fd_ = -1;
-};
-
 /// A connection and what came over it and was not yet used.
 struct Connection {
-  Socket socket;
+  FileDescriptor socket;
   std::string received;
   std::chrono::steady_clock::time_point deadline;  ///< of the header that is being received
 };
@@ -85,8 +69,8 @@ class RequestGate {
   void wake();
 
   GateLimits limits_;
-  Socket listener_;
-  Socket wake_;
+  FileDescriptor listener_;
+  FileDescriptor wake_;
   int port_ = 0;
   std::list<Connection> waiting_;  // used by the gate's thread
   mutable std::mutex mutex_;       // guards what follows

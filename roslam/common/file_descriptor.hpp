@@ -5,7 +5,7 @@
 
 #include <utility>
 
-namespace roslam::telemetry {
+namespace roslam {
 
 /// A file descriptor that is closed with its owner; -1: none.
 class FileDescriptor {
@@ -28,4 +28,4 @@ class FileDescriptor {
   int descriptor_;
 };
 
-}  // namespace roslam::telemetry
+}  // namespace roslam
