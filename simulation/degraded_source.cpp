@@ -70,7 +70,7 @@ std::vector<std::string> degradation_names() {
 }
 
 std::optional<std::size_t> DegradedSource::size() const {
-  const auto all = source_->size();
+  const auto all = source().size();
   if (!all || degradation_ == Degradation::kBursts)
     return std::nullopt;  // unknown before the images are read
   const std::size_t interval = kind_of(degradation_).interval;
@@ -92,7 +92,7 @@ bool DegradedSource::is_missing(const Frame& frame) {
 
 std::optional<Frame> DegradedSource::next() {
   std::vector<InertialSample> inertial;  // of missing frames
-  while (auto frame = source_->next()) {
+  while (auto frame = source().next()) {
     prepend_samples(std::move(inertial), frame->inertial);
     inertial.clear();
     if (is_missing(*frame)) {

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "roslam/sensors/frame_source.hpp"
+#include "simulation/wrapped_source.hpp"
 
 namespace roslam::simulation {
 
@@ -30,24 +29,18 @@ std::optional<Degradation> degradation_from(std::string_view name);
 std::vector<std::string> degradation_names();
 
 /// A source whose images are degraded. The same source gives the same images each time.
-class DegradedSource : public FrameSource {
+class DegradedSource : public WrappedSource {
  public:
   DegradedSource(std::unique_ptr<FrameSource> source, Degradation degradation)
-      : source_(std::move(source)), degradation_(degradation) {}
+      : WrappedSource(*source), owned_(std::move(source)), degradation_(degradation) {}
 
   std::optional<Frame> next() override;
-  void interrupt() override { source_->interrupt(); }
-  bool is_live() const override { return source_->is_live(); }
-  const Camera& camera() const override { return source_->camera(); }
   std::optional<std::size_t> size() const override;
-  std::map<std::string, std::size_t> skipped() const override { return source_->skipped(); }
-  std::map<std::string, std::size_t> notes() const override { return source_->notes(); }
-  std::map<std::string, std::size_t> skipped_depth() const override { return source_->skipped_depth(); }
 
  private:
   bool is_missing(const Frame& frame);
 
-  std::unique_ptr<FrameSource> source_;
+  std::unique_ptr<FrameSource> owned_;
   Degradation degradation_;
   std::optional<double> begin_;  // seconds, time of the first image
 };

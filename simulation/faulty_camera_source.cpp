@@ -47,7 +47,7 @@ std::vector<std::string> camera_fault_names() {
 
 FaultyCameraSource::FaultyCameraSource(std::unique_ptr<FrameSource> source,
                                        const std::vector<CameraFault>& faults)
-    : source_(std::move(source)), camera_(source_->camera()) {
+    : WrappedSource(*source), owned_(std::move(source)), camera_(owned_->camera()) {
   constexpr std::size_t kDelay = 2;
   for (const CameraFault fault : faults) {
     switch (fault) {
@@ -77,11 +77,11 @@ FaultyCameraSource::FaultyCameraSource(std::unique_ptr<FrameSource> source,
 }
 
 void FaultyCameraSource::set_depth_camera(double focal_ratio, double beside) {
-  Camera depth = source_->camera();
+  Camera depth = source().camera();
   depth.fx *= focal_ratio;
   depth.fy *= focal_ratio;
   to_depth_camera_ = std::make_unique<DepthRegistration>(
-      source_->camera(), depth, SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(beside, 0.0, 0.0)));
+      source().camera(), depth, SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(beside, 0.0, 0.0)));
 }
 
 void FaultyCameraSource::set_lens(CameraFault fault) {
@@ -101,7 +101,7 @@ void FaultyCameraSource::set_lens(CameraFault fault) {
 }
 
 std::optional<Frame> FaultyCameraSource::next() {
-  std::optional<Frame> frame = source_->next();
+  std::optional<Frame> frame = source().next();
   if (!frame) return frame;
   if (!frame->depth.empty()) {
     if (to_depth_camera_) frame->depth = (*to_depth_camera_)(frame->depth);

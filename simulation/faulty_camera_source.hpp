@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "roslam/sensors/depth_registration.hpp"
-#include "roslam/sensors/frame_source.hpp"
+#include "simulation/wrapped_source.hpp"
 
 namespace roslam::simulation {
 
@@ -36,23 +36,18 @@ std::vector<std::string> camera_fault_names();
 /// A source to which faults of a camera are added, to test what should find them. Of a source whose camera
 /// has distortion, kNoDistortion and kInverseDistortion change the camera alone; else the images are
 /// distorted too.
-class FaultyCameraSource : public FrameSource {
+class FaultyCameraSource : public WrappedSource {
  public:
   FaultyCameraSource(std::unique_ptr<FrameSource> source, const std::vector<CameraFault>& faults);
 
   std::optional<Frame> next() override;
-  void interrupt() override { source_->interrupt(); }
   const Camera& camera() const override { return camera_; }
-  std::optional<std::size_t> size() const override { return source_->size(); }
-  std::map<std::string, std::size_t> skipped() const override { return source_->skipped(); }
-  std::map<std::string, std::size_t> notes() const override { return source_->notes(); }
-  std::map<std::string, std::size_t> skipped_depth() const override { return source_->skipped_depth(); }
 
  private:
   void set_lens(CameraFault fault);
   void set_depth_camera(double focal_ratio, double beside);
 
-  std::unique_ptr<FrameSource> source_;
+  std::unique_ptr<FrameSource> owned_;
   Camera camera_;
   double depth_factor_ = 1.0;
   std::size_t depth_delay_ = 0, colour_delay_ = 0;  // frames

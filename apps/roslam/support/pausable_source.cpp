@@ -19,7 +19,7 @@ void PausableSource::interrupt() {
     is_interrupted_ = true;
   }
   changed_.notify_all();
-  source_.interrupt();
+  WrappedSource::interrupt();
 }
 
 std::optional<Frame> PausableSource::next() {
@@ -30,7 +30,7 @@ std::optional<Frame> PausableSource::next() {
       due_ = Clock::now();
     }
   }
-  auto frame = source_.next();
+  auto frame = WrappedSource::next();
   if (!frame || !is_paced_) return frame;
   std::unique_lock lock(mutex_);
   if (due_) {  // the reader, who is behind by the pause, does not wait any more

@@ -6,34 +6,27 @@
 #include <mutex>
 #include <optional>
 
-#include "roslam/sensors/frame_source.hpp"
+#include "simulation/wrapped_source.hpp"
 
 namespace roslam::app {
 
 /// A source that can be paused. After a pause, frames that are to come at the pace of their timestamps do
 /// so, and are not made up for.
-class PausableSource : public FrameSource {
+class PausableSource : public simulation::WrappedSource {
  public:
   /// is_paced: the reader takes frames at the pace of their timestamps. source must outlive the object.
   PausableSource(FrameSource& source, bool is_paced)
-      : source_(source), is_paced_(is_paced && !source.is_live()) {}
+      : WrappedSource(source), is_paced_(is_paced && !source.is_live()) {}
 
   /// Safe from any thread.
   void pause(bool is_paused);
 
   std::optional<Frame> next() override;
   void interrupt() override;
-  bool is_live() const override { return source_.is_live(); }
-  const Camera& camera() const override { return source_.camera(); }
-  std::optional<std::size_t> size() const override { return source_.size(); }
-  std::map<std::string, std::size_t> skipped() const override { return source_.skipped(); }
-  std::map<std::string, std::size_t> notes() const override { return source_.notes(); }
-  std::map<std::string, std::size_t> skipped_depth() const override { return source_.skipped_depth(); }
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  FrameSource& source_;
   bool is_paced_;
   std::mutex mutex_;
   std::condition_variable changed_;
