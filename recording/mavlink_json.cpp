@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recording/mavlink_json.hpp"
+#include "roslam/common/formatted.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 namespace roslam::recording {
 
@@ -17,11 +16,7 @@ double rounded(double value) {
   return std::round(value * kFactor) / kFactor;
 }
 
-std::string milliseconds(double value) {
-  std::array<char, 32> words{};
-  std::snprintf(words.data(), words.size(), "%.1f ms", value);
-  return words.data();
-}
+std::string milliseconds(double value) { return formatted("%.1f ms", value); }
 }  // namespace
 
 nlohmann::ordered_json mavlink_json(const MavlinkReport& report) {

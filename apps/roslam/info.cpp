@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -15,6 +13,7 @@
 #include "evaluation/json_number.hpp"
 #include "evaluation/plots/markdown_table.hpp"
 #include "roslam/common/error.hpp"
+#include "roslam/common/formatted.hpp"
 #include "roslam/ros/recording_streams.hpp"
 
 namespace roslam::app {
@@ -59,16 +58,10 @@ std::string size_of(const RecordedImages& images) {
                              : std::to_string(images.size.width) + "x" + std::to_string(images.size.height);
 }
 
-std::string words(const char* format, double a, double b, double c, double d) {
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), format, a, b, c, d);
-  return text.data();
-}
-
 std::string calibration_of(const RecordedImages& images) {
   if (!images.info) return "none";
   const auto& K = images.info->K;
-  std::string text = words("fx %.6g fy %.6g cx %.6g cy %.6g", K[0], K[4], K[2], K[5]);
+  std::string text = formatted("fx %.6g fy %.6g cx %.6g cy %.6g", K[0], K[4], K[2], K[5]);
   if (!images.info->model.empty()) text += ", " + images.info->model;
   for (const double value : images.info->distortion) text += " " + fixed(value, 5);
   return text;
@@ -129,7 +122,7 @@ void print(const Recording& recording, const RecordingContents& contents, const 
             << streams.depth.topic.name
             << (streams.T_colour_depth ? ", to be registered to colour" : ", as registered to colour");
   if (streams.camera.depth_units_per_metre > 0.0)
-    std::cout << ", " << words("%.6g units a metre", streams.camera.depth_units_per_metre, 0, 0, 0);
+    std::cout << ", " << formatted("%.6g units a metre", streams.camera.depth_units_per_metre);
   if (contents.camera) std::cout << "\n  camera    " << kCameraTopic << ", with mount and noise";
   std::cout << "\n  inertial  ";
   for (const RecordedTopic& topic : streams.inertial) std::cout << topic.name << " ";

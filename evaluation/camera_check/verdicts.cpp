@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evaluation/camera_check/verdicts.hpp"
+#include "roslam/common/formatted.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 namespace roslam::evaluation {
@@ -12,13 +11,6 @@ namespace roslam::evaluation {
 namespace {
 constexpr const char* kNoEdges =
     "too few steps in depth were seen: record objects before a far background, with texture";
-
-template <typename... Values>
-std::string text_of(const char* format, Values... values) {
-  std::array<char, 400> text{};
-  std::snprintf(text.data(), text.size(), format, values...);
-  return text.data();
-}
 
 CameraFinding fits(std::string words) { return {Verdict::kFits, std::move(words), {}}; }
 CameraFinding unknown(std::string words) { return {Verdict::kCannotTell, std::move(words), {}}; }
@@ -55,20 +47,21 @@ CameraFinding judge_timing(const CameraCheck& check) {
   const EdgeFit& edges = *check.edges;
   const double lag = edges.lag.mean;
   const std::string figure =
-      text_of("depth is %.0f ms (%.1f +- %.1f frames) %s", 1e3 * check.interval * std::abs(lag),
-              std::abs(lag), edges.lag.sigma, lag < 0.0 ? "early" : "late");
+      formatted("depth is %.0f ms (%.1f +- %.1f frames) %s", 1e3 * check.interval * std::abs(lag),
+                std::abs(lag), edges.lag.sigma, lag < 0.0 ? "early" : "late");
   if (!is_aligned(edges))
     return unknown("edges of depth and colour do not coincide under any alignment that was tried");
   if (edges.best.lag != 0 && std::abs(lag) > kMisfit &&
       is_better(edges.over_in_time, kLeastShare, edges.score))
-    return misfit(figure, text_of("match depth images to colour images by %.3f s %s timestamps (the driver's "
-                                  "synchronisation, or the offset in the list of depth images)",
-                                  check.interval * std::abs(lag), lag < 0.0 ? "later" : "earlier"));
+    return misfit(figure,
+                  formatted("match depth images to colour images by %.3f s %s timestamps (the driver's "
+                            "synchronisation, or the offset in the list of depth images)",
+                            check.interval * std::abs(lag), lag < 0.0 ? "later" : "earlier"));
   if (edges.tells_lag < kSigmas || edges.best.lag != 0)
     return unknown(
-        text_of("too little motion or too few steps in depth: images two frames earlier or later fit "
-                "as well (%.1f standard errors worse); turn the camera faster",
-                edges.tells_lag));
+        formatted("too little motion or too few steps in depth: images two frames earlier or later fit "
+                  "as well (%.1f standard errors worse); turn the camera faster",
+                  edges.tells_lag));
   if (std::abs(lag) + 2.0 * edges.lag.sigma > kMisfit || std::abs(lag) > kTolerance)
     return unknown(figure + ", which is too near to one frame to tell");
   return fits(figure);
@@ -81,7 +74,7 @@ CameraFinding judge_registration(const CameraCheck& check, const Camera& camera)
   if (!check.edges) return unknown(kNoEdges);
   const EdgeFit& edges = *check.edges;
   const double moved = displacement(edges, camera);
-  const std::string figure = text_of(
+  const std::string figure = formatted(
       "depth is shifted by (%.1f +- %.1f, %.1f +- %.1f) px and %.3f +- %.3f times as large as colour",
       -edges.x.mean, edges.x.sigma, -edges.y.mean, edges.y.sigma, 1.0 / edges.zoom.mean, edges.zoom.sigma);
   if (!is_aligned(edges))
@@ -94,9 +87,9 @@ CameraFinding judge_registration(const CameraCheck& check, const Camera& camera)
   if (moved > kTolerance) return unknown(figure + ", which is too little or too uncertain to count");
   if (edges.tells_registration < kSigmas)
     return unknown(
-        text_of("too few steps in depth, or too similar ones: images that are moved by 8 px fit as well "
-                "(%.1f standard errors worse)",
-                edges.tells_registration));
+        formatted("too few steps in depth, or too similar ones: images that are moved by 8 px fit as well "
+                  "(%.1f standard errors worse)",
+                  edges.tells_registration));
   return fits(figure);
 }
 
@@ -110,23 +103,23 @@ CameraFinding judge_distortion(const CameraCheck& check, const Camera& camera) {
   const LensFit& given = check.as_given;
   if (given.pairs < kFewestPairs || given.points < kFewestPoints)
     return unknown(
-        text_of("only %zu points in %zu pairs of images have texture, depth and a motion that fits",
-                given.points, given.pairs));
+        formatted("only %zu points in %zu pairs of images have texture, depth and a motion that fits",
+                  given.points, given.pairs));
   if (given.outermost < kOutermost)
     return unknown(
-        text_of("the corners were not seen: 95 %% of the points are within %.0f %% of the way to them",
-                100.0 * given.outermost));
+        formatted("the corners were not seen: 95 %% of the points are within %.0f %% of the way to them",
+                  100.0 * given.outermost));
   if (std::min({given.free_error, check.inverse.free_error, check.none.free_error}) > kMostError)
     return unknown(
-        text_of("no rigid motion explains the images under any lens (mean error %.1f px): too much moves "
-                "in them, or depth does not belong to them",
-                given.free_error));
+        formatted("no rigid motion explains the images under any lens (mean error %.1f px): too much moves "
+                  "in them, or depth does not belong to them",
+                  given.free_error));
   const double share = std::pow(given.outermost, 3);
   const Contrast left{share * given.corner.mean, share * given.corner.sigma};
-  std::string figure = text_of("mean error %.2f px as given", given.error);
+  std::string figure = formatted("mean error %.2f px as given", given.error);
   if (camera.has_distortion())
-    figure += text_of(", %.2f without, %.2f with the inverse sign", check.none.error, check.inverse.error);
-  figure += text_of(
+    figure += formatted(", %.2f without, %.2f with the inverse sign", check.none.error, check.inverse.error);
+  figure += formatted(
       "; left over: k1 %.3f +- %.3f, which moves points by %.1f +- %.1f px at %.0f %% of the way to the "
       "corners",
       given.k1.mean, given.k1.sigma, left.mean, left.sigma, 100.0 * given.outermost);
@@ -145,8 +138,9 @@ CameraFinding judge_distortion(const CameraCheck& check, const Camera& camera) {
         figure,
         camera.has_distortion()
             ? "calibrate the lens: the coefficients are not those of these images"
-            : text_of("add the distortion of the lens, by its camera_info or a calibration; about [%.3f, 0]",
-                      given.k1.mean));
+            : formatted(
+                  "add the distortion of the lens, by its camera_info or a calibration; about [%.3f, 0]",
+                  given.k1.mean));
   if (left.sigma > kMostSigma)
     return unknown(figure + "; too uncertain: record textured, near surfaces while turning the camera");
   if (std::abs(left.mean) > kTolerance)
@@ -159,20 +153,21 @@ namespace {
 std::string scale_remedy(const Contrast& scale, const Camera& camera) {
   const double factor = scale.mean, uncertainty = std::max(0.15, 2.5 * scale.sigma / scale.mean);
   if (camera.depth_units_per_metre <= 0.0)
-    return text_of("%s depth by %.3g", factor > 1.0 ? "divide" : "multiply", std::max(factor, 1.0 / factor));
+    return formatted("%s depth by %.3g", factor > 1.0 ? "divide" : "multiply",
+                     std::max(factor, 1.0 / factor));
   const double units = camera.depth_units_per_metre * factor;
   double best = units, least = uncertainty;
   for (const double usual : {100.0, 256.0, 1000.0, 4000.0, 5000.0, 10000.0, 65535.0}) {
     const double apart = std::abs(std::log(units / usual));
     if (apart < least) best = usual, least = apart;
   }
-  return text_of(best == units ? "set depth_units_per_metre about %.3g" : "set depth_units_per_metre %.0f",
-                 best);
+  return formatted(best == units ? "set depth_units_per_metre about %.3g" : "set depth_units_per_metre %.0f",
+                   best);
 }
 
 std::string scale_in_words(double factor) {
-  return factor > 1.0 ? text_of("depth is %.2f times too large", factor)
-                      : text_of("depth is %.2f times too small", 1.0 / factor);
+  return factor > 1.0 ? formatted("depth is %.2f times too large", factor)
+                      : formatted("depth is %.2f times too small", 1.0 / factor);
 }
 
 std::optional<CameraFinding> by_truth(const CameraCheck& check, const Camera& camera) {
@@ -181,8 +176,8 @@ std::optional<CameraFinding> by_truth(const CameraCheck& check, const Camera& ca
   if (!check.scale) return std::nullopt;
   const double factor = check.scale->mean, deviation = std::abs(std::log(factor)),
                sigma = check.scale->sigma / factor;
-  const std::string figure =
-      text_of("motions by depth are %.3f +- %.3f times as long as the true ones", factor, check.scale->sigma);
+  const std::string figure = formatted("motions by depth are %.3f +- %.3f times as long as the true ones",
+                                       factor, check.scale->sigma);
   if (deviation > kMisfit && check.distortion.verdict == Verdict::kDoesNotFit)
     return unknown(figure + ", by the wrong lens: correct the distortion and check again");
   if (deviation > kMisfit && deviation > kSigmas * sigma)
@@ -198,7 +193,7 @@ std::optional<CameraFinding> by_sensor(const CameraCheck& check) {
   constexpr double kLongestBaseline = 0.16, kFar = 15.0;  // metres
   if (!check.baseline || !check.step_factor) return std::nullopt;
   const double ratio = *check.baseline / *check.step_factor;
-  const std::string figure = text_of(
+  const std::string figure = formatted(
       "steps of depth and shadows are those of a sensor with a baseline of %.3f m and "
       "disparity in steps of %.3f px",
       *check.baseline, *check.baseline * *check.step_factor);
@@ -219,7 +214,7 @@ CameraFinding judge_depth_scale(const CameraCheck& check, const Camera& camera) 
   constexpr double kMultiples = 0.999;
   constexpr double kFar = 5.0;  // metres, median, beyond which sensors that write millimetres are poor
   const std::string range =
-      text_of("depth is %.2f to %.2f m, half of it within %.2f m", check.near, check.far, check.median);
+      formatted("depth is %.2f to %.2f m, half of it within %.2f m", check.near, check.far, check.median);
   if (check.far <= 0.0) return unknown("no depth is known");
   if (auto finding = by_truth(check, camera)) return *finding;
   if (check.far < kAllNear || check.median < kHalfNear)

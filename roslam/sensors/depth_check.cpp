@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <opencv2/imgproc.hpp>
 
+#include "roslam/common/formatted.hpp"
 #include "roslam/common/upper_median.hpp"
 
 namespace roslam {
@@ -100,13 +100,6 @@ void push(std::deque<Value>& values, Value value, std::size_t most) {
   if (values.size() > most) values.pop_front();
 }
 
-template <typename... Values>
-std::string text_of(const char* format, Values... values) {
-  std::array<char, 240> text{};
-  std::snprintf(text.data(), text.size(), format, values...);
-  return text.data();
-}
-
 double median_of(const std::deque<double>& values) {
   std::vector<double> copy(values.begin(), values.end());
   return upper_median(copy);
@@ -196,16 +189,16 @@ void DepthCheck::check_scale(const DepthSpread& spread, const cv::Mat& depth) {
     scale_.add(depth, fx_);
     const auto baseline = scale_.implausible_baseline();
     if (baseline && median_of(far_) < kFar)
-      raise(text_of("depth is implausibly large: its steps and shadows are those of a baseline of %.2f m; "
-                    "depth_units_per_metre is probably too small",
-                    *baseline),
+      raise(formatted("depth is implausibly large: its steps and shadows are those of a baseline of %.2f m; "
+                      "depth_units_per_metre is probably too small",
+                      *baseline),
             is_large_);
   }
   if (far_.size() < kLeastSamples + kHistory) return;
   if (median_of(far_) > kNear && median_of(medians_) > kMedianNear) return;
-  raise(text_of("depth is implausibly small: 95 %% of the image within %.2f m, half within %.2f m; "
-                "depth_units_per_metre is probably too large",
-                median_of(far_), median_of(medians_)),
+  raise(formatted("depth is implausibly small: 95 %% of the image within %.2f m, half within %.2f m; "
+                  "depth_units_per_metre is probably too large",
+                  median_of(far_), median_of(medians_)),
         is_small_);
 }
 
@@ -271,7 +264,7 @@ void DepthCheck::judge() {
     const char* kind = best.index < kFlips + kHistory
                            ? "the depth images lag behind the colour images by about %.1f s"
                            : "the depth images are ahead of the colour images by about %.1f s";
-    raise(text_of(kind, seconds), is_misfit_);
+    raise(formatted(kind, seconds), is_misfit_);
   } else if (verdicts_.size() >= kSurely) {
     constexpr double kUnrelated = 0.6;
     constexpr double kTrouble = 0.25;  // share of frames lost or made keyframes

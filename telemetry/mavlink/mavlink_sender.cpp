@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cstdio>
 #include <deque>
 #include <mutex>
 #include <stop_token>
@@ -15,6 +14,7 @@
 
 #include "roslam/common/error.hpp"
 #include "roslam/common/file_descriptor.hpp"
+#include "roslam/common/formatted.hpp"
 #include "roslam/common/thread_priority.hpp"
 #include "telemetry/mavlink/autopilot_watch.hpp"
 
@@ -31,12 +31,6 @@ struct Waiting {
   TrackingReport report;
   Clock::time_point known;
 };
-
-std::string in_words(const char* format, double value) {
-  std::array<char, 128> words{};
-  std::snprintf(words.data(), words.size(), format, value);
-  return words.data();
-}
 }  // namespace
 
 class MavlinkSender::Impl {
@@ -104,8 +98,8 @@ MavlinkSender::Impl::Impl(const MavlinkAddress& address, const MavlinkSenderOpti
   report_.frame = options.stream.frame;
   const double load = options.bytes_per_second();
   if (const int baud = baud_for(load); address.capacity() && address.baud < baud)
-    warn(in_words("%.1f kB a second are to be sent, ", load / 1e3) +
-         in_words("and the port carries %.1f: poses will be dropped; use ", *address.capacity() / 1e3) +
+    warn(formatted("%.1f kB a second are to be sent, ", load / 1e3) +
+         formatted("and the port carries %.1f: poses will be dropped; use ", *address.capacity() / 1e3) +
          std::to_string(baud) + " baud or more");
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
@@ -281,7 +275,7 @@ void MavlinkSender::Impl::check_camera(Clock::time_point now) {
     return;
   is_camera_lost_ = true;
   say(MavlinkSeverity::kCritical,
-      in_words("RO-SLAM: no images for %.1f s", std::chrono::duration<double>(now - *last_frame_).count()));
+      formatted("RO-SLAM: no images for %.1f s", std::chrono::duration<double>(now - *last_frame_).count()));
 }
 
 void MavlinkSender::Impl::tell_loops() {
@@ -292,7 +286,7 @@ void MavlinkSender::Impl::tell_loops() {
        ++i)
     say(MavlinkSeverity::kInfo, loops[i].merges_submaps
                                     ? "RO-SLAM: submaps merged"
-                                    : in_words("RO-SLAM: loop closed, map moved by %.2f m", loops[i].moved));
+                                    : formatted("RO-SLAM: loop closed, map moved by %.2f m", loops[i].moved));
   loops_told_ = std::max(loops_told_, loops.size());
 }
 

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <numbers>
 #include <optional>
 
+#include "roslam/common/formatted.hpp"
 #include "roslam/geometry/se3.hpp"
 #include "telemetry/mavlink/mavlink_link.hpp"
 
@@ -21,12 +21,6 @@ Spread spread_of(std::vector<double> values) {
   if (values.empty()) return {};
   std::sort(values.begin(), values.end());
   return {values.front(), values[values.size() / 2], values.back()};
-}
-
-std::string in_words(const char* format, double value) {
-  std::array<char, 64> words{};
-  std::snprintf(words.data(), words.size(), format, value);
-  return words.data();
 }
 
 double sigma_of(const std::array<float, 21>& covariance, std::array<std::size_t, 3> diagonal) {
@@ -63,7 +57,7 @@ class Measure {
   void add(const TrackingReport& report, const MavlinkMessage& message) {
     count_bytes(encode(message, MavlinkId{}, 0).size());
     if (const auto* text = std::get_if<StatusTextMessage>(&message))
-      check_.texts.push_back(in_words("%.3f s ", report.timestamp) + std::string(text->words()));
+      check_.texts.push_back(formatted("%.3f s ", report.timestamp) + std::string(text->words()));
     const auto* odometry = std::get_if<OdometryMessage>(&message);
     if (odometry == nullptr) return;
     ++share_of(report.state).messages;
@@ -136,24 +130,25 @@ std::vector<StreamRule> rules_of(const StreamCheck& check) {
   constexpr double kPx4Rate = 29.0;  // 30 Hz of a camera that is a little slow
   constexpr double kArduPilotRate = 4.0, kStopGap = 0.4, kHealthyGap = 0.3, kLevel = 10.0, kGate = 0.5;
   const bool has_any = check.counts.odometry > 0;
-  const std::string gap = in_words("%.0f ms while tracking", 1e3 * check.longest_gap_tracking);
-  const std::string any_gap = in_words("%.0f ms", 1e3 * check.longest_gap);
-  const std::string rate = in_words("%.1f Hz", check.rate);
-  return {{"both", "poses are sent", std::to_string(check.counts.odometry) + " messages", has_any},
-          {"PX4", "rate of 30 Hz", rate, check.rate >= kPx4Rate},
-          {"ArduPilot", "rate of at least 4 Hz", rate, check.rate >= kArduPilotRate},
-          {"PX4", "gaps of at most 200 ms while tracking", gap,
-           has_any && check.longest_gap_tracking <= kLongGap},
-          {"PX4", "no gap of more than 400 ms: it stops using vision", any_gap,
-           has_any && check.longest_gap <= kStopGap},
-          {"ArduPilot", "no gap of more than 300 ms: the sensor counts as unhealthy", any_gap,
-           has_any && check.longest_gap <= kHealthyGap},
-          {"ArduPilot", "roll and pitch within 10 degrees of level at the start",
-           in_words("%.1f degrees", check.first_tilt), has_any && check.first_tilt <= kLevel},
-          {"PX4", "steps without a reset within 0.5 m of the velocity (5 sigma of EKF2_EVP_NOISE)",
-           in_words("%.3f m", check.largest_surprise), has_any && check.largest_surprise <= kGate},
-          {"both", "covariances are known and positive", in_words("least %.4f m", check.position_sigma.least),
-           has_any && check.position_sigma.least > 0.0 && std::isfinite(check.position_sigma.most)}};
+  const std::string gap = formatted("%.0f ms while tracking", 1e3 * check.longest_gap_tracking);
+  const std::string any_gap = formatted("%.0f ms", 1e3 * check.longest_gap);
+  const std::string rate = formatted("%.1f Hz", check.rate);
+  return {
+      {"both", "poses are sent", std::to_string(check.counts.odometry) + " messages", has_any},
+      {"PX4", "rate of 30 Hz", rate, check.rate >= kPx4Rate},
+      {"ArduPilot", "rate of at least 4 Hz", rate, check.rate >= kArduPilotRate},
+      {"PX4", "gaps of at most 200 ms while tracking", gap,
+       has_any && check.longest_gap_tracking <= kLongGap},
+      {"PX4", "no gap of more than 400 ms: it stops using vision", any_gap,
+       has_any && check.longest_gap <= kStopGap},
+      {"ArduPilot", "no gap of more than 300 ms: the sensor counts as unhealthy", any_gap,
+       has_any && check.longest_gap <= kHealthyGap},
+      {"ArduPilot", "roll and pitch within 10 degrees of level at the start",
+       formatted("%.1f degrees", check.first_tilt), has_any && check.first_tilt <= kLevel},
+      {"PX4", "steps without a reset within 0.5 m of the velocity (5 sigma of EKF2_EVP_NOISE)",
+       formatted("%.3f m", check.largest_surprise), has_any && check.largest_surprise <= kGate},
+      {"both", "covariances are known and positive", formatted("least %.4f m", check.position_sigma.least),
+       has_any && check.position_sigma.least > 0.0 && std::isfinite(check.position_sigma.most)}};
 }
 }  // namespace
 

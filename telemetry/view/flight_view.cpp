@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "roslam/common/formatted.hpp"
 #include "telemetry/view/frame_image.hpp"
 
 namespace roslam::telemetry {
@@ -162,12 +163,10 @@ std::vector<ClosedLoop> FlightView::loops() const {
   const std::scoped_lock lock(mutex_);
   for (; known_loops_ < loops.size(); ++known_loops_) {
     const ClosedLoop& loop = loops[known_loops_];
-    char moved[64];
-    std::snprintf(moved, sizeof moved, ", moved by %.2f m", loop.moved);
     write(status_.timestamp, false,
           (loop.merges_submaps ? "submaps merged" : "loop closed") + std::string(": keyframe ") +
               std::to_string(loop.keyframe.value) + " sees " + std::to_string(loop.matched_keyframe.value) +
-              moved);
+              formatted(", moved by %.2f m", loop.moved));
   }
   return loops;
 }

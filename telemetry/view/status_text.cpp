@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "telemetry/view/status_text.hpp"
+#include "roslam/common/formatted.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
@@ -23,12 +23,6 @@ std::string in_one_line(const Json& json) {
 
 // To so many parts of one: as a decimal number it is short.
 double rounded(double value, double parts) { return std::round(value * parts) / parts; }
-
-std::string with_unit(double value, const char* unit) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%.1f %s", value, unit);
-  return text;
-}
 
 bool is_lost(TrackingState state) {
   return state == TrackingState::kRecentlyLost || state == TrackingState::kLost;
@@ -69,7 +63,7 @@ Health health_of(const ViewStatus& status) {
     return {"ended", {std::string(name_of(status.phase))}};
   std::vector<std::string>& reasons = health.reasons;
   const bool has_no_pose = is_lost(status.state);
-  if (has_no_pose) reasons.push_back("lost for " + with_unit(status.state_seconds, "s"));
+  if (has_no_pose) reasons.push_back("lost for " + formatted("%.1f s", status.state_seconds));
   if (status.phase == RunPhase::kStarting) reasons.emplace_back("no frame yet");
   if (status.phase == RunPhase::kPaused) reasons.emplace_back("paused");
   if (status.phase == RunPhase::kFlying) {
@@ -79,10 +73,10 @@ Health health_of(const ViewStatus& status) {
     if (status.state == TrackingState::kTracking && status.quality < kPoorQuality)
       reasons.emplace_back("tracking quality below 0.2");
     if (status.since_frame > kStalled)
-      reasons.push_back("no frame for " + with_unit(status.since_frame, "s"));
-    if (status.latency > kLate) reasons.push_back("latency of " + with_unit(1e3 * status.latency, "ms"));
+      reasons.push_back("no frame for " + formatted("%.1f s", status.since_frame));
+    if (status.latency > kLate) reasons.push_back("latency of " + formatted("%.1f ms", 1e3 * status.latency));
     if (status.recent_drops > kManyDrops)
-      reasons.push_back(with_unit(100.0 * status.recent_drops, "% of the frames are dropped"));
+      reasons.push_back(formatted("%.1f %% of the frames are dropped", 100.0 * status.recent_drops));
   }
   for (const std::string& warning : status.warnings) reasons.push_back(warning);
   health.status = has_no_pose ? "lost" : reasons.empty() ? "ok" : "degraded";
@@ -108,11 +102,9 @@ std::string metrics_text(const ViewStatus& status, const ViewCounts& counts) {
   std::string text;
   const auto add = [&text](std::string_view name, std::string_view type, std::string_view help,
                            double value) {
-    char number[32];
-    std::snprintf(number, sizeof number, "%.10g", value);
     text.append("# HELP roslam_").append(name).append(" ").append(help).append("\n# TYPE roslam_");
     text.append(name).append(" ").append(type).append("\nroslam_").append(name).append(" ");
-    text.append(number).append("\n");
+    text.append(formatted("%.10g", value)).append("\n");
   };
   const auto count = [](std::size_t n) { return static_cast<double>(n); };
   add("frames_total", "counter", "Frames that were processed.", count(status.processed));

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "roslam/cameras/realsense_camera.hpp"
+#include "roslam/common/formatted.hpp"
 #include "roslam/geometry/mount.hpp"
 
 namespace roslam::app {
@@ -81,9 +82,8 @@ void SourceRecorder::add(const Frame& frame, const std::stop_token& stop) {
 }
 
 std::string SourceRecorder::in_words() const {
-  char size[32];
-  std::snprintf(size, sizeof(size), "%.1f", static_cast<double>(recorder_.bytes()) * 1e-6);
-  std::string words = "recorded: " + file_ + ", " + size + " MB";
+  std::string words =
+      "recorded: " + file_ + formatted(", %.1f MB", static_cast<double>(recorder_.bytes()) * 1e-6);
   if (const std::size_t lost = recorder_.lost(); lost > 0)
     words += "\nWARNING: " + std::to_string(lost) +
              " images or samples were not recorded, as the disk is too slow for them";
