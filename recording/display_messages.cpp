@@ -12,10 +12,6 @@
 namespace roslam::recording {
 
 namespace {
-void put_vector(RosWriter& writer, const Eigen::Vector3d& vector) {
-  for (int k = 0; k < 3; ++k) writer.put(vector(k));
-}
-
 // Row by row, over (x, y, z, rotation x, y, z) as ROS has it too.
 void put_covariance(RosWriter& writer, const Matrix6d& covariance) {
   for (int row = 0; row < 6; ++row)
@@ -51,10 +47,8 @@ std::int64_t ros_stamp(double seconds) {
   if (!(seconds >= 0.0 && seconds < kEnd))
     throw InputError("a time that ROS cannot stamp: " + std::to_string(seconds) +
                      " s; it has to be from 0 to 2147483648");
-  const double whole = std::floor(seconds);
-  constexpr std::int64_t kMicroseconds = 1'000'000, kNanoseconds = 1000;  // of a second, of a microsecond
-  const std::int64_t rest = std::llround((seconds - whole) * static_cast<double>(kMicroseconds));
-  return (static_cast<std::int64_t>(whole) * kMicroseconds + rest) * kNanoseconds;
+  constexpr std::int64_t kMicrosecond = 1000;  // ns
+  return (nanoseconds_of(seconds) + kMicrosecond / 2) / kMicrosecond * kMicrosecond;
 }
 
 RosMessage encode_odometry(const Odometry& odometry) {
@@ -89,6 +83,7 @@ RosMessage encode_points(const RosHeader& header, std::span<const ColouredPoint>
   writer.put(std::uint8_t{0});  // little-endian
   writer.put(static_cast<std::uint32_t>(kPointBytes));
   writer.put(static_cast<std::uint32_t>(kPointBytes * points.size()));
+  writer.reserve(kPointBytes * points.size());
   writer.count(kPointBytes * points.size());
   for (const ColouredPoint& point : points) writer.raw(bytes_of(point));
   writer.put(std::uint8_t{1});  // every point is valid

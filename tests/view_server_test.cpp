@@ -140,7 +140,7 @@ TEST(Surfaces, AreEncoded) {
 TEST(RecordedRuns, GiveAllTheirPointsInBlocks) {
   RecordedView::Contents contents;
   for (int i = 0; i < 300; ++i)
-    contents.dense.push_back({{0.01F * static_cast<float>(i) - 1.0F, 0.5F, -7.25F}, {10, 20, 30}});
+    contents.dense.push_back({{0.01F * static_cast<float>(i) - 1.0F, 0.5F, -7.25F}, {30, 20, 10}});
   contents.dense.push_back({{std::nanf(""), 0.0F, 0.0F}, {0, 0, 0}});
   const RecordedView view(contents);
   std::vector<float> x;

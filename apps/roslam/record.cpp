@@ -25,12 +25,6 @@ struct RecordArguments {
   bool quiet = false;
 };
 
-void print_counts(const char* what, const std::map<std::string, std::size_t>& counts) {
-  for (const auto& [reason, number] : counts)
-    std::printf("%s%s%s\n", what, reason.c_str(),
-                number > 1 ? (" (" + std::to_string(number) + " times)").c_str() : "");
-}
-
 // A recording that is read and written at once would be destroyed.
 void require_another_file(const RecordArguments& arguments) {
   std::error_code error;

@@ -12,6 +12,13 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kWait{100};  // for samples, so that an interrupt is noticed
 constexpr int kFpsOfUsb2 = 15;
+
+std::optional<DepthCameraDevice> with_serial(const std::vector<DepthCameraDevice>& devices,
+                                             const std::string& serial) {
+  const auto found = std::find_if(devices.begin(), devices.end(),
+                                  [&](const auto& device) { return device.serial == serial; });
+  return found == devices.end() ? std::nullopt : std::optional(*found);
+}
 }  // namespace
 
 void LiveSourceOptions::validate() const {
@@ -55,9 +62,7 @@ DepthCameraDevice CameraConnection::find() const {
     throw InputError(camera +
                      ": several cameras are connected; choose one by its serial number: " + connected);
   }
-  const auto found = std::find_if(devices.begin(), devices.end(),
-                                  [&](const auto& device) { return device.serial == options_.serial; });
-  if (found != devices.end()) return *found;
+  if (const auto found = with_serial(devices, options_.serial)) return *found;
   throw InputError(camera + ": no camera of that serial number is connected; there is " + connected);
 }
 
@@ -138,11 +143,9 @@ CameraConnection::Outcome CameraConnection::attempt(bool resets) noexcept {
       outcome.is_reset = true;
       return outcome;
     }
-    const auto devices = driver_->devices();
-    const auto found = std::find_if(devices.begin(), devices.end(),
-                                    [&](const auto& device) { return device.serial == device_.serial; });
-    outcome.is_there = found != devices.end();
-    if (!outcome.is_there) {
+    const auto found = with_serial(driver_->devices(), device_.serial);
+    outcome.is_there = found.has_value();
+    if (!found) {
       outcome.why = "it is not connected";
       return outcome;
     }

@@ -29,11 +29,11 @@ std::string_view model_of(const Camera& camera) {
   constexpr std::size_t kPlumbBob = 5;
   return camera.coefficients().size() > kPlumbBob ? "rational_polynomial" : "plumb_bob";
 }
+}  // namespace
 
 void put_vector(RosWriter& writer, const Eigen::Vector3d& vector) {
   for (int k = 0; k < 3; ++k) writer.put(vector(k));
 }
-}  // namespace
 
 void put_pose(RosWriter& writer, const SE3& pose) {
   put_vector(writer, pose.translation());
@@ -50,6 +50,7 @@ RosMessage encode_image(const RosHeader& header, const cv::Mat& pixels) {
   writer.text(encoding);
   writer.put(std::uint8_t{0});  // little-endian
   const std::size_t step = static_cast<std::size_t>(pixels.cols) * pixels.elemSize();
+  writer.reserve(step * static_cast<std::size_t>(pixels.rows));
   writer.put(static_cast<std::uint32_t>(step));
   writer.count(step * static_cast<std::size_t>(pixels.rows));
   for (int y = 0; y < pixels.rows; ++y) writer.raw({pixels.ptr(y), step});

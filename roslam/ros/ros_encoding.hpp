@@ -41,6 +41,9 @@ ROSLAM_EXPORT RosMessage encode_pose(const RosTransform& pose);
 /// std_msgs/String.
 ROSLAM_EXPORT RosMessage encode_text(std::string_view text);
 
+/// Three numbers, as geometry_msgs/Vector3 and Point have them.
+ROSLAM_EXPORT void put_vector(RosWriter& writer, const Eigen::Vector3d& vector);
+
 /// A position and a quaternion x y z w, the fields of most messages that hold a pose.
 ROSLAM_EXPORT void put_pose(RosWriter& writer, const SE3& pose);
 

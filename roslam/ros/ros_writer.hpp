@@ -64,6 +64,9 @@ class RosWriter {
     text(frame);
   }
 
+  /// Makes room for so many bytes more.
+  void reserve(std::size_t bytes) { bytes_.reserve(bytes_.size() + bytes); }
+
   std::vector<std::uint8_t> take() { return std::move(bytes_); }
 
  private:

@@ -65,9 +65,6 @@ void FlightView::add(const Frame& frame, const FrameResult& result) {
 void FlightView::note(const FrameResult& result) {
   const TrackingState before = status_.state;
   if (result.state != before) {
-    const auto is_lost = [](TrackingState state) {
-      return state == TrackingState::kRecentlyLost || state == TrackingState::kLost;
-    };
     if (is_lost(result.state) && !is_lost(before))
       write(result.timestamp, true, "tracking lost: " + std::string(describe(result.no_pose)));
     if (result.state == TrackingState::kTracking && is_lost(before))

@@ -22,10 +22,8 @@ std::shared_ptr<const MapSnapshot> map_of(const RecordedView::Contents& contents
     map->keyframes.push_back({KeyframeId{static_cast<std::uint32_t>(map->keyframes.size())}, kOnly,
                               pose.timestamp, pose.T_world_camera});
   for (const RecordedView::Point& point : contents.landmarks)
-    map->landmarks.push_back({LandmarkId{static_cast<std::uint32_t>(map->landmarks.size())},
-                              kOnly,
-                              point.position,
-                              {point.colour[2], point.colour[1], point.colour[0]}});
+    map->landmarks.push_back(
+        {LandmarkId{static_cast<std::uint32_t>(map->landmarks.size())}, kOnly, point.position, point.colour});
   return map;
 }
 }  // namespace
@@ -61,7 +59,7 @@ void RecordedView::add_surfaces(const std::vector<Point>& points) {
       packed.position[axis] =
           static_cast<std::uint8_t>(std::min(255.0F, 256.0F * (place - std::floor(place))));
     }
-    packed.colour = {point.colour[2], point.colour[1], point.colour[0]};
+    packed.colour = point.colour;
     auto& block = blocks[index];
     if (!block) block = std::make_shared<SurfaceBlock>();
     block->index = index;

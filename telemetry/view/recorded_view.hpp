@@ -2,8 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <memory>
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
@@ -16,8 +16,8 @@ namespace roslam::telemetry {
 class RecordedView : public ViewSubject {
  public:
   struct Point {
-    Eigen::Vector3f position;            ///< world frame, metres
-    std::array<std::uint8_t, 3> colour;  ///< red, green, blue
+    Eigen::Vector3f position;  ///< world frame, metres
+    cv::Vec3b colour;          ///< BGR
   };
   struct Contents {
     std::string run;     ///< id

@@ -24,10 +24,6 @@ std::string in_one_line(const Json& json) {
 // To so many parts of one: as a decimal number it is short.
 double rounded(double value, double parts) { return std::round(value * parts) / parts; }
 
-bool is_lost(TrackingState state) {
-  return state == TrackingState::kRecentlyLost || state == TrackingState::kLost;
-}
-
 Json pose_json(const SE3& pose) {
   const Eigen::Vector3d& p = pose.translation();
   const Eigen::Quaterniond& q = pose.rotation();

@@ -32,6 +32,10 @@ enum class RunPhase {
 /// One word, for the page and other programs.
 std::string_view name_of(RunPhase phase);
 
+inline bool is_lost(TrackingState state) {
+  return state == TrackingState::kRecentlyLost || state == TrackingState::kLost;
+}
+
 /// How a run goes.
 struct ViewStatus {
   std::string run;     ///< id; another one after a restart

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "apps/roslam/support/output.hpp"
 #include "recording/mavlink_json.hpp"
 
 namespace roslam::app {
@@ -53,9 +54,7 @@ void print_frames(const Slam& slam, const RunResults& summary, const FrameSource
   for (const auto& [warning, frames] : slam.warnings())
     std::printf("WARNING: %s%s\n", warning.c_str(),
                 frames > 1 ? (" (" + std::to_string(frames) + " frames)").c_str() : "");
-  for (const auto& [note, number] : source.notes())
-    std::printf("note: %s%s\n", note.c_str(),
-                number > 1 ? (" (" + std::to_string(number) + " times)").c_str() : "");
+  print_counts("note: ", source.notes());
 }
 
 }  // namespace
@@ -99,7 +98,7 @@ void print_summary(const Flight& flight, const FlightArguments& arguments) {
     std::printf("latency: median %.1f ms, p95 %.1f ms, p99 %.1f ms from the image to its pose\n",
                 found->second.median_ms, found->second.p95_ms, found->second.p99_ms);
   }
-  if (summary.mavlink) std::printf("%s\n", in_words(*summary.mavlink).c_str());
+  if (summary.mavlink) std::printf("%s\n", recording::in_words(*summary.mavlink).c_str());
   if (!flight.recorded.empty()) std::printf("%s\n", flight.recorded.c_str());
   std::printf("results: %s\n", arguments.out.c_str());
 }

@@ -29,8 +29,7 @@ struct ViewArguments {
 std::vector<telemetry::RecordedView::Point> points_of(const std::vector<recording::ColouredPoint>& points) {
   std::vector<telemetry::RecordedView::Point> result;
   result.reserve(points.size());
-  for (const recording::ColouredPoint& point : points)
-    result.push_back({point.position, {point.colour[2], point.colour[1], point.colour[0]}});
+  for (const recording::ColouredPoint& point : points) result.push_back({point.position, point.colour});
   return result;
 }
 

@@ -37,4 +37,10 @@ std::string in_words(const std::map<std::string, std::size_t>& counts) {
   return all;
 }
 
+void print_counts(const char* kind, const std::map<std::string, std::size_t>& counts) {
+  for (const auto& [reason, number] : counts)
+    std::printf("%s%s%s\n", kind, reason.c_str(),
+                number > 1 ? (" (" + std::to_string(number) + " times)").c_str() : "");
+}
+
 }  // namespace roslam::app

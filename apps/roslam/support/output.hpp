@@ -20,4 +20,7 @@ void require_written_output();
 /// Reasons with their counts, as the end of an error message: "; 3 x no depth; 1 x truncated".
 std::string in_words(const std::map<std::string, std::size_t>& counts);
 
+/// Prints them on stdout, a line each: "note: camera was lost (2 times)". kind: "note: ".
+void print_counts(const char* kind, const std::map<std::string, std::size_t>& counts);
+
 }  // namespace roslam::app
