@@ -14,6 +14,7 @@ set(ROSLAM_PUBLIC_HEADERS
   geometry/imu_calibration.hpp
   geometry/mount.hpp
   geometry/se3.hpp
+  geometry/stereo_rig.hpp
   geometry/trajectory.hpp
   sensors/depth_registration.hpp
   sensors/counts.hpp
@@ -42,11 +43,16 @@ set(ROSLAM_PUBLIC_HEADERS
   cameras/camera_recorder.hpp
   datasets/dataset.hpp
   datasets/folder_source.hpp
+  stereo/dense_stereo.hpp
+  stereo/rectified_source.hpp
+  stereo/stereo_options.hpp
+  stereo/stereo_rectifier.hpp
   features/descriptor.hpp
   features/feature_grid.hpp
   features/feature_options.hpp
   features/observed_frame.hpp
   features/orb_extractor.hpp
+  features/stereo_matcher.hpp
   estimation/estimation_options.hpp
   estimation/measurement_model.hpp
   inference/inference.hpp

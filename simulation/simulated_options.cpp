@@ -48,6 +48,7 @@ void SimulatorOptions::validate() const {
   check("gain", gain, 0.1, 10);
   check("pitch_down", pitch_down, -0.8, 1.58);
   check("sway", sway, 0, 5);
+  check("baseline", baseline, 0.01, 2);
   check("colour_noise", colour_noise, 0, 50);
 }
 

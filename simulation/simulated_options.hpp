@@ -40,6 +40,8 @@ struct SimulatorOptions {
   double pitch_down = 0.26;   ///< of the camera below the horizon, radians; in the corridor it is 0.1
   double sway = 1.0;          ///< of the drone; 1 is a few centimetres and about a degree, 0 none
   double gusts = 0.0;         ///< of wind; 1 turns the drone at up to 60 degrees a second, 0 is calm air
+  bool stereo = false;        ///< frames are stereo pairs; a source gives no depth then
+  double baseline = 0.12;     ///< of the pairs, metres
   bool imu = false;           ///< frames carry the samples of an inertial measurement unit
   double gain = 1.0;          ///< factor on the images' brightness, as under other lighting
   double colour_noise = 1.5;  ///< standard deviation, grey levels

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "roslam/common/error.hpp"
@@ -26,6 +27,10 @@ Camera camera_for(const SimulatorOptions& options) {
   camera.fps = options.fps;
   if (options.imu) camera.imu = simulated_imu();
   camera.T_body_camera = Flight(options).T_body_camera();
+  if (options.stereo) {
+    camera.baseline = options.baseline;
+    camera.depth_noise.reset();  // that of the depth camera
+  }
   return camera;
 }
 
@@ -72,6 +77,18 @@ struct Simulator::Impl {
   cv::Mat measured(const cv::Mat& depth, std::size_t index) const {
     if (options.depth == DepthModel::kIdeal) return depth;
     return stereo_depth(depth, camera, {}, mix(options.seed, static_cast<std::uint32_t>(index), 0xdeb7U));
+  }
+
+  // Of a second camera, whose exposure and noise are its own.
+  cv::Mat right_image(const SE3& T_world_camera, std::size_t index) const {
+    constexpr double kGain = 0.92;
+    const SE3 T_left_right(Eigen::Quaterniond::Identity(), {options.baseline, 0.0, 0.0});
+    const simulation::Image image = renderer.draw(T_world_camera * T_left_right);
+    const auto seed = mix(options.seed, static_cast<std::uint32_t>(index), 0x2198b7U);
+    cv::Mat grey;
+    cv::cvtColor(expose(image.colour, kGain * options.gain, options.colour_noise, seed), grey,
+                 cv::COLOR_BGR2GRAY);
+    return grey;
   }
 
   SimulatorOptions options;
@@ -121,6 +138,7 @@ SimulatedView Simulator::render(std::size_t index, SimulatedParts parts) {
   const auto noise_seed = mix(impl_->options.seed, static_cast<std::uint32_t>(index), 0xca3e7aU);
   view.frame.colour = expose(image.colour, impl_->options.gain, impl_->options.colour_noise, noise_seed);
   view.frame.depth = impl_->measured(image.depth, index);
+  if (impl_->options.stereo) view.frame.right = impl_->right_image(pose, index);
   view.frame.labels = image.labels;
   view.instances = image.instances;
   if (parts == SimulatedParts::kBackground) {
@@ -134,7 +152,9 @@ SimulatedView Simulator::render(std::size_t index, SimulatedParts parts) {
 
 std::optional<Frame> SimulatedSource::next() {
   if (index_ >= simulator_.size()) return std::nullopt;
-  return simulator_.render(index_++).frame;
+  Frame frame = simulator_.render(index_++).frame;
+  if (camera().is_stereo()) frame.depth.release();
+  return frame;
 }
 
 }  // namespace roslam::simulation

@@ -10,8 +10,8 @@ namespace roslam::simulation {
 
 /// A frame of the simulated flight with its ground truth.
 struct SimulatedView {
-  Frame frame;                ///< colour, depth, labels (Cityscapes train ids, 255 = none of them) and pose
-  cv::Mat instances;          ///< CV_16UC1, number of the moving object; 0 = none moves there
+  Frame frame;        ///< colour, right, depth, labels (Cityscapes train ids, 255 = none of them) and pose
+  cv::Mat instances;  ///< CV_16UC1, number of the moving object; 0 = none moves there
   cv::Mat background_colour;  ///< CV_8UC3, the same view without movable objects, parked cars included
   cv::Mat background_depth;   ///< CV_32FC1, its depth, with noise as the depth of the frame
 };

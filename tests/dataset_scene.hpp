@@ -197,7 +197,7 @@ class DatasetFolder : public testing::Test {
   }
 
   /// The message of the InputError that opening gives.
-  std::string refused(const std::optional<Camera>& camera = {}, DatasetUse use = DatasetUse::kDepth) const {
+  std::string refused(const std::optional<Camera>& camera = {}, DatasetUse use = DatasetUse::kSlam) const {
     try {
       open_dataset(folder_, camera, use);
     } catch (const InputError& error) {

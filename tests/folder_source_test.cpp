@@ -50,15 +50,15 @@ TEST_F(AnyFolder, HostileFilesAreRefusedWithOneLine) {
   EXPECT_NE(refused().find("is no dataset that is known"), std::string::npos);
   fs::create_directories(folder_ / "mav0/cam0");
   fs::create_symlink("/dev/zero", folder_ / "mav0/cam0/data.csv");
-  EXPECT_NE(refused({}, DatasetUse::kImagesOnly).find("cannot open it"), std::string::npos);
+  EXPECT_NE(refused({}, DatasetUse::kImages).find("cannot open it"), std::string::npos);
   put("mav0/cam0/sensor.yaml", std::string(50'000, '['));
-  EXPECT_NE(refused({}, DatasetUse::kImagesOnly).find("not a valid YAML file"), std::string::npos);
+  EXPECT_NE(refused({}, DatasetUse::kImages).find("not a valid YAML file"), std::string::npos);
   put("mav0/cam0/sensor.yaml", "intrinsics: [61, 58, 30.5, 25]\nresolution: [1e30, .nan]\nT_BS: {data: [" +
                                    std::string("1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}\n"));
   fs::remove(folder_ / "mav0/cam0/data.csv");
   put("mav0/cam0/data.csv", "1,../../../etc/passwd\n");
-  EXPECT_NE(refused({}, DatasetUse::kImagesOnly).find("'resolution'"), std::string::npos);
-  const auto source = open_dataset(folder_, small_camera(), DatasetUse::kImagesOnly);
+  EXPECT_NE(refused({}, DatasetUse::kImages).find("'resolution'"), std::string::npos);
+  const auto source = open_dataset(folder_, small_camera(), DatasetUse::kImages);
   EXPECT_FALSE(source->next());
   EXPECT_EQ(source->skipped().size(), 1u);
 }

@@ -90,13 +90,14 @@ constexpr std::size_t kUnlistedInpainting = 1;  // InpaintingOptions::classic: w
 std::map<std::string, std::size_t> fields_by_section() {
   // A section that is added to Options must be added here, too: it does not compile otherwise.
   const Options options;
-  const auto& [orb, depth, noise, segmenter, dynamic_objects, matcher, pose, local_map, relocaliser, tracker,
-               plausible, keyframes, landmarks, fusion, culling, bundle, loop, geometric_verifier,
+  const auto& [orb, depth, stereo, noise, segmenter, dynamic_objects, matcher, pose, local_map, relocaliser,
+               tracker, plausible, keyframes, landmarks, fusion, culling, bundle, loop, geometric_verifier,
                loop_closer, pose_graph, restoration, reprojection, inpainting, depth_completion, dense,
                threads] = options;
   const auto count = [](const auto& section) { return field_count<std::decay_t<decltype(section)>>(); };
   return {{"orb", count(orb)},
           {"depth", count(depth)},
+          {"stereo", count(stereo)},
           {"noise", count(noise)},
           {"segmenter", count(segmenter)},
           {"dynamic_objects", count(dynamic_objects)},

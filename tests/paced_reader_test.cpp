@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Recorded frames come as a camera would give them, and an end, an error or a stop never leaves anyone
 // waiting.
-#include "roslam/sensors/paced_reader.hpp"
+#include "roslam/workers/paced_reader.hpp"
 
 #include <gtest/gtest.h>
 

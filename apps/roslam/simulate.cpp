@@ -14,6 +14,7 @@
 #include "apps/roslam/support/progress.hpp"
 #include "apps/roslam/support/tum_writer.hpp"
 #include "recording/output_folder.hpp"
+#include "roslam/common/formatted.hpp"
 #include "roslam/common/write_file.hpp"
 #include "simulation/simulated_source.hpp"
 
@@ -33,6 +34,7 @@ struct SimulateArguments {
   std::size_t frames = 0;
   std::uint32_t seed = 1;
   bool imu = false;
+  bool stereo = false;
   bool overwrite = false;
   bool json = false;
 };
@@ -50,6 +52,9 @@ Writes to the folder of --out; images are named after their timestamp in seconds
   imu.txt                 with --imu: timestamp (s), turn rates (rad/s), accelerations (m/s^2)
   groundtruth.txt         camera poses: timestamp (s), position (m), quaternion x y z w
   camera.yaml             camera parameters, for --camera of roslam run
+  image_2/ image_3/ calib.txt times.txt poses.txt
+                          with --stereo: left and right images and poses, in the layout of KITTI odometry;
+                          roslam run takes these then
   labels/                 8 bit: class of each pixel, Cityscapes train ids, 255 = none of them
   instances/              16 bit: number of the moving object, 0 = none
   background/rgb, depth   the same images without movable objects, parked cars included
@@ -77,6 +82,46 @@ void write_images(const fs::path& out, const std::string& name, const SimulatedV
                    packed_depth(view.background_depth, camera.depth_units_per_metre));
 }
 
+// The lists of KITTI odometry: P2 and P3 project from the frame of the left camera.
+class StereoFiles {
+ public:
+  StereoFiles(const fs::path& out, const Camera& camera)
+      : out_(out), times_(out / "times.txt"), poses_(out / "poses.txt") {
+    for (const char* folder : {"image_2", "image_3"}) make_folder(out / folder);
+    TextFile calibration(out / "calib.txt");
+    for (const auto& [name, x] : {std::pair{"P2", 0.0}, std::pair{"P3", -camera.fx * camera.baseline}}) {
+      char text[256];
+      std::snprintf(text, sizeof(text), "%s: %.9f 0 %.9f %.9f 0 %.9f %.9f 0 0 0 1 0", name, camera.fx,
+                    camera.cx, x, camera.fy, camera.cy);
+      calibration.line(text);
+    }
+    calibration.close();
+  }
+
+  void add(const Frame& frame) {
+    char name[32], time[32];
+    std::snprintf(name, sizeof(name), "%06zu.png", count_++);
+    std::snprintf(time, sizeof(time), "%.9f", frame.timestamp);
+    write_image_fast(out_ / "image_2" / name, frame.colour);
+    write_image_fast(out_ / "image_3" / name, frame.right);
+    times_.line(time);
+    const Eigen::Matrix4d T = frame.T_world_camera->matrix();
+    std::string line;
+    for (int i = 0; i < 12; ++i) line += (i > 0 ? " " : "") + formatted("%.9f", T(i / 4, i % 4));
+    poses_.line(line);
+  }
+
+  void close() {
+    times_.close();
+    poses_.close();
+  }
+
+ private:
+  fs::path out_;
+  TextFile times_, poses_;
+  std::size_t count_ = 0;
+};
+
 void write_inertial(TextFile& file, const std::vector<InertialSample>& samples) {
   for (const auto& [time, w, a] : samples) {
     char text[256];
@@ -95,10 +140,12 @@ void simulate(const SimulateArguments& arguments) {
   options.frames = arguments.frames;
   options.seed = arguments.seed;
   options.imu = arguments.imu;
-  const recording::OutputFolder out(arguments.out, "simulate",
-                                    {"rgb.txt", "depth.txt", "groundtruth.txt", "imu.txt", "camera.yaml",
-                                     "rgb", "depth", "labels", "instances", "background"},
-                                    arguments.overwrite);
+  options.stereo = arguments.stereo;
+  const recording::OutputFolder out(
+      arguments.out, "simulate",
+      {"rgb.txt", "depth.txt", "groundtruth.txt", "imu.txt", "camera.yaml", "rgb", "depth", "labels",
+       "instances", "background", "image_2", "image_3", "calib.txt", "times.txt", "poses.txt"},
+      arguments.overwrite);
   for (const char* folder : {"rgb", "depth", "labels", "instances", "background/rgb", "background/depth"}) {
     make_folder(arguments.out / folder);
   }
@@ -110,6 +157,8 @@ void simulate(const SimulateArguments& arguments) {
   TextFile poses(arguments.out / "groundtruth.txt");
   std::optional<TextFile> inertial;
   if (arguments.imu) inertial.emplace(arguments.out / "imu.txt");
+  std::optional<StereoFiles> stereo;
+  if (arguments.stereo) stereo.emplace(arguments.out, simulator.camera());
   if (inertial) inertial->line("# timestamp wx wy wz ax ay az");
   colours.line("# timestamp filename");
   depths.line("# timestamp filename");
@@ -124,12 +173,14 @@ void simulate(const SimulateArguments& arguments) {
     depths.line(time + " depth/" + time + ".png");
     poses.line(pose_line(view.frame.timestamp, *view.frame.T_world_camera));
     if (inertial) write_inertial(*inertial, view.frame.inertial);
+    if (stereo) stereo->add(view.frame);
     progress.show(written + 1, "rendered");
   }
   colours.close();
   depths.close();
   poses.close();
   if (inertial) inertial->close();
+  if (stereo) stereo->close();
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   if (arguments.json) {
     const nlohmann::json summary{{"out", arguments.out.string()}, {"path", arguments.path},
@@ -179,6 +230,8 @@ void add_simulate_command(CLI::App& program) {
       ->capture_default_str();
   command->add_flag("--imu", arguments->imu,
                     "Write the samples of a gyroscope and an accelerometer as well, 200 Hz");
+  command->add_flag("--stereo", arguments->stereo,
+                    "Write the images of a second camera as well, 0.12 m to the right of the first");
   command->add_flag("--overwrite", arguments->overwrite,
                     "Replace files in the folder of --out that this command did not write");
   command->add_flag("--json", arguments->json, "Print the summary as one JSON object on stdout");

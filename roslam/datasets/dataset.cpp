@@ -2,11 +2,13 @@
 #include "roslam/datasets/dataset.hpp"
 
 #include <string>
+#include <utility>
 
 #include "roslam/common/error.hpp"
 #include "roslam/datasets/formats.hpp"
 #include "roslam/datasets/text_numbers.hpp"
 #include "roslam/datasets/tum_source.hpp"
+#include "roslam/stereo/rectified_source.hpp"
 
 namespace roslam {
 
@@ -114,13 +116,15 @@ std::unique_ptr<FrameSource> open_dataset(const fs::path& folder, const std::opt
                   "KITTI odometry); a TUM RGB-D folder holds rgb.txt, depth.txt and the images they name"));
   }
   const Format& entry = entry_of(*format);
-  if (!entry.has_depth && use == DatasetUse::kDepth) {
-    throw InputError(folder.string() + ": " + std::string(entry.name) +
-                     " has stereo pairs and no depth, and stereo is not supported yet; give a dataset with "
-                     "depth images");
-  }
   if (!entry.list) return open_tum(folder, camera);
-  return std::make_unique<FolderSource>(entry.list(folder, camera));
+  auto source = std::make_unique<FolderSource>(entry.list(folder, camera));
+  if (entry.has_depth || use == DatasetUse::kImages) return source;
+  if (!source->right()) {
+    throw InputError(folder.string() +
+                     ": has the images of one camera only, which do not tell the scale of the map; give "
+                     "stereo pairs (the second camera's folder and calibration) or images with depth");
+  }
+  return std::make_unique<RectifiedSource>(std::move(source));
 }
 
 }  // namespace roslam

@@ -16,8 +16,8 @@ enum class DatasetFormat { kTum, kSevenScenes, kScanNet, kIclNuim, kOpenLoris, k
 
 /// What a folder is opened for.
 enum class DatasetUse {
-  kDepth,       ///< frames with colour and depth
-  kImagesOnly,  ///< images are enough: folders of stereo pairs give the left ones, with an empty depth
+  kSlam,   ///< frames with depth, or rectified stereo pairs
+  kImages  ///< the images as they are in the folder, of stereo pairs not rectified
 };
 
 /// The format of a folder by its content; nothing if none is recognised.
@@ -30,12 +30,13 @@ ROSLAM_EXPORT std::string_view name_of(DatasetFormat format);
 ROSLAM_EXPORT bool has_depth(DatasetFormat format);
 
 /// Opens a folder. camera: as the user gave it, or nothing: then the calibration that the folder or its
-/// format has is taken. Frames carry the ground truth as poses of the camera, where the folder has it. Throws
-/// InputError if the folder is missing, not recognised or malformed, if its camera is not known (the message
-/// names fitting presets), or if it has no depth and use is kDepth; CalibrationError if the camera is invalid
-/// or has no depth_units_per_metre.
+/// format has is taken, of stereo pairs in place of that of the left camera. Frames carry the ground truth as
+/// poses of the camera, where the folder has it. Throws InputError if the folder is missing, not recognised
+/// or malformed, if its camera is not known (the message names fitting presets), or if it has neither depth
+/// nor a right camera and use is kSlam; CalibrationError if the camera is invalid, has no
+/// depth_units_per_metre, or makes no usable pair with the right one.
 ROSLAM_EXPORT std::unique_ptr<FrameSource> open_dataset(const std::filesystem::path& folder,
                                                         const std::optional<Camera>& camera,
-                                                        DatasetUse use = DatasetUse::kDepth);
+                                                        DatasetUse use = DatasetUse::kSlam);
 
 }  // namespace roslam

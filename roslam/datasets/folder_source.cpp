@@ -74,11 +74,21 @@ std::optional<Frame> FolderSource::read(std::size_t index) {
   frame.timestamp = files.timestamp;
   frame.depth = read_depth(files, frame.colour.size());
   if (listing_.transform) listing_.transform(frame.colour, frame.depth);
+  frame.right = read_right(files);
   frame.T_world_camera = files.T_world_camera;
   const auto& samples = listing_.inertial;
   while (next_inertial_ < samples.size() && samples[next_inertial_].timestamp <= frame.timestamp)
     frame.inertial.push_back(samples[next_inertial_++]);
   return frame;
+}
+
+cv::Mat FolderSource::read_right(const ListedFrame& files) {
+  if (!listing_.right) return {};
+  if (files.right.empty()) {
+    ++images_.skipped_depth["no right image near in time"];
+    return {};
+  }
+  return images_.right(files.right, {listing_.right->camera.width, listing_.right->camera.height});
 }
 
 cv::Mat FolderSource::read_depth(const ListedFrame& files, const cv::Size& colour_size) {

@@ -25,14 +25,6 @@ struct ROSLAM_EXPORT ListedFrame {
   std::optional<SE3> T_world_camera;  ///< ground truth, if known
 };
 
-/// The right camera of a stereo pair. Its images are listed for a stereo front end and not read.
-struct ROSLAM_EXPORT RightCamera {
-  Camera camera;
-  SE3 T_left_right;  ///< maps coordinates of the right camera to those of the left; metres
-
-  double baseline() const { return T_left_right.translation().norm(); }  ///< metres
-};
-
 /// What a folder holds, in the terms that all formats share.
 struct ROSLAM_EXPORT FolderListing {
   std::string folder;  ///< for messages
@@ -71,12 +63,12 @@ class ROSLAM_EXPORT FolderSource : public FrameSource {
   /// The files of a frame returned by next(). index: its Frame::index.
   const ListedFrame& files(std::size_t index) const { return listing_.frames.at(index); }
 
-  /// The right camera, if the folder has a stereo pair.
-  const std::optional<RightCamera>& right() const { return listing_.right; }
+  std::optional<RightCamera> right() const override { return listing_.right; }
 
  private:
   void drop_frames_out_of_order();
   std::optional<Frame> read(std::size_t index);
+  cv::Mat read_right(const ListedFrame& files);
   cv::Mat read_depth(const ListedFrame& files, const cv::Size& colour_size);
 
   FolderListing listing_;

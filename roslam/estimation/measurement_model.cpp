@@ -29,13 +29,15 @@ MeasurementNoise MeasurementNoise::known_of(const std::optional<double>& pixels,
 }
 
 Measurement Measurement::make(const Eigen::Vector2f& pixel, float depth, float scale,
-                              const MeasurementNoise& noise) {
+                              const MeasurementNoise& noise, double inverse_depth_sigma) {
   Measurement m;
   m.pixel = pixel.cast<double>();
   m.depth = depth;
   m.pixel_weight = 1.0 / (noise.pixel_sigma * scale);
   m.outlier_factor = noise.outlier_factor;
-  m.depth_weight = depth > 0.0F ? m.depth * m.depth / noise.sigma_of_depth(m.depth) : 0.0;
+  if (depth > 0.0F)
+    m.depth_weight = inverse_depth_sigma > 0.0 ? 1.0 / inverse_depth_sigma
+                                               : m.depth * m.depth / noise.sigma_of_depth(m.depth);
   return m;
 }
 

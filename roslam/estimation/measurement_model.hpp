@@ -18,8 +18,9 @@ struct ROSLAM_EXPORT Measurement {
   double depth_weight = 0.0;                        ///< 1 / sigma of 1 / depth, metres; 0 = no depth
   double outlier_factor = 1.0;                      ///< multiple of the limit, see MeasurementNoise
 
+  /// inverse_depth_sigma: 1/metre, of this depth where it is known better than by the noise; 0: it is not.
   static Measurement make(const Eigen::Vector2f& pixel, float depth, float scale,
-                          const MeasurementNoise& noise);
+                          const MeasurementNoise& noise, double inverse_depth_sigma = 0.0);
   bool has_depth() const { return depth_weight > 0.0; }
 };
 

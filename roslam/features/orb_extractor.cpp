@@ -204,12 +204,8 @@ cv::Mat OrbExtractor::forbidden(const cv::Mat& mask) const {
   return wider;
 }
 
-std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat& mask, const cv::Mat& part,
-                                              std::vector<cv::Point2f>* removed) const {
+std::vector<cv::Mat> OrbExtractor::pyramid(const cv::Mat& grey) const {
   if (grey.empty() || grey.type() != CV_8UC1) throw InputError("ORB extraction needs an 8-bit grey image");
-  if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
-    throw InputError("the mask of ORB extraction must be an 8-bit image of the size of the image");
-  }
   std::vector<cv::Mat> pyramid{grey};
   for (std::size_t level = 1; level < scales_.size(); ++level) {
     const cv::Size size(cvRound(static_cast<float>(grey.cols) / scales_[level]),
@@ -217,6 +213,15 @@ std::vector<OrbFeature> OrbExtractor::extract(const cv::Mat& grey, const cv::Mat
     cv::Mat smaller;
     cv::resize(pyramid.back(), smaller, size, 0, 0, cv::INTER_LINEAR);
     pyramid.push_back(smaller);
+  }
+  return pyramid;
+}
+
+std::vector<OrbFeature> OrbExtractor::extract(const std::vector<cv::Mat>& pyramid, const cv::Mat& mask,
+                                              const cv::Mat& part, std::vector<cv::Point2f>* removed) const {
+  const cv::Mat& grey = pyramid.front();
+  if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
+    throw InputError("the mask of ORB extraction must be an 8-bit image of the size of the image");
   }
   std::vector<cv::KeyPoint> points = detect(pyramid, mask.empty() ? mask : forbidden(mask), part, removed);
   std::vector<OrbFeature> features(points.size());

@@ -41,7 +41,16 @@ class ROSLAM_EXPORT OrbExtractor {
   /// The same with points in a part of the mask as well (CV_8UC1, nonzero there; may be empty), about as
   /// dense as elsewhere: OrbFeature::is_in_part. The others are those that there would be without it.
   std::vector<OrbFeature> extract(const cv::Mat& grey, const cv::Mat& mask, const cv::Mat& part,
-                                  std::vector<cv::Point2f>* removed) const;
+                                  std::vector<cv::Point2f>* removed) const {
+    return extract(pyramid(grey), mask, part, removed);
+  }
+
+  /// The same of an image whose pyramid() is known.
+  std::vector<OrbFeature> extract(const std::vector<cv::Mat>& pyramid, const cv::Mat& mask,
+                                  const cv::Mat& part, std::vector<cv::Point2f>* removed) const;
+
+  /// The image (CV_8UC1) at all levels, finest first. Throws InputError for another type.
+  std::vector<cv::Mat> pyramid(const cv::Mat& grey) const;
 
   /// The mask dilated by mask_margin (CV_8UC1): where points are rejected.
   cv::Mat forbidden(const cv::Mat& mask) const;

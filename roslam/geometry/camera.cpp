@@ -114,6 +114,11 @@ void Camera::validate() const {
   constexpr double kFar = 10.0;  // metres; more is a wrong unit
   require(T_body_camera.is_finite() && T_body_camera.translation().norm() <= kFar,
           "T_body_camera must be a rigid transform of at most 10 m");
+  require(baseline >= 0.0 && baseline <= kFar,
+          "baseline must be 0 (no stereo pair) to 10 metres, got " + std::to_string(baseline));
+  require(baseline == 0.0 || !has_distortion(),
+          "a camera with a baseline is of rectified images; it has no "
+          "distortion");
   if (depth_noise) {
     const auto [constant, growth] = *depth_noise;
     require(constant >= 0.0 && constant < 10.0 && growth >= 0.0 && growth < 10.0 && constant + growth > 0.0,

@@ -43,12 +43,16 @@ struct ROSLAM_EXPORT Camera {
   std::optional<DepthNoise> depth_noise = {};  ///< if known; where images begin to show it that counts
   std::optional<ImuCalibration> imu = {};      ///< of the inertial measurement unit fixed to it, if any
   SE3 T_body_camera = forward_camera();        ///< how it is mounted; the body is x forward, y left, z up
+  double baseline = 0.0;  ///< metres along x to the right camera of a rectified stereo pair; 0: no pair
 
   /// Throws CalibrationError naming the field that is out of range. depth_units_per_metre may be 0 (not set):
   /// depth in metres needs none, and a source of 16-bit depth refuses it.
   void validate() const;
 
   bool has_distortion() const;
+
+  /// Whether it is the left camera of a rectified stereo pair. The right one has the same pixels' geometry.
+  bool is_stereo() const { return baseline > 0.0; }
 
   /// Whether it is a pinhole with k4, k5 or k6.
   bool is_rational() const;
@@ -109,9 +113,10 @@ ROSLAM_EXPORT std::string_view usual_depth_units();
 /// Reads a camera file, of RO-SLAM or as import_camera() takes them (camera_import.hpp). That of RO-SLAM is
 /// YAML (model, width, height, fx, fy, cx, cy, distortion, depth_units_per_metre, fps,
 /// depth_noise: {constant, growth}, imu: {T_camera_imu: 16 numbers, row by row, gyroscope_noise,
-/// gyroscope_walk}, T_body_camera: 16 numbers, row by row); only model, distortion, fps (30), depth_noise,
-/// imu and T_body_camera have defaults. distortion: k1 k2 p1 p2 k3, k1 k2 p1 p2, k1 k2, or none. Throws
-/// InputError for a missing or malformed file or an unknown key, CalibrationError as validate does.
+/// gyroscope_walk}, T_body_camera: 16 numbers, row by row, baseline); only model, distortion, fps (30),
+/// depth_noise, imu, T_body_camera and baseline (0) have defaults, and with a baseline depth_units_per_metre.
+/// distortion: k1 k2 p1 p2 k3, k1 k2 p1 p2, k1 k2, or none. Throws InputError for a missing or malformed file
+/// or an unknown key, CalibrationError as validate does.
 ROSLAM_EXPORT Camera read_camera(const std::filesystem::path& file);
 
 /// A preset name or a camera file. Throws as read_camera does.

@@ -37,9 +37,10 @@ class CameraFile {
 };
 
 void reject_unknown_keys(const std::filesystem::path& path, const YAML::Node& node) {
-  const std::set<std::string> known{"model",       "width", "height",       "fx",  "fy",
-                                    "cx",          "cy",    "distortion",   "fps", "depth_units_per_metre",
-                                    "depth_noise", "imu",   "T_body_camera"};
+  const std::set<std::string> known{
+      "model",       "width", "height",        "fx",      "fy",
+      "cx",          "cy",    "distortion",    "fps",     "depth_units_per_metre",
+      "depth_noise", "imu",   "T_body_camera", "baseline"};
   std::set<std::string> seen;
   for (const auto& entry : node) {
     if (!entry.first.IsScalar())
@@ -50,7 +51,7 @@ void reject_unknown_keys(const std::filesystem::path& path, const YAML::Node& no
       throw InputError(path.string() + ": '" + key + "' is given twice; remove one");
     if (!known.contains(key)) {
       throw InputError(path.string() + ": unknown key '" + key + "'; known: model width height fx fy cx cy " +
-                       "distortion depth_units_per_metre fps depth_noise imu T_body_camera");
+                       "distortion depth_units_per_metre fps depth_noise imu T_body_camera baseline");
     }
   }
 }
@@ -147,12 +148,13 @@ Camera read_own(const std::filesystem::path& file, const YAML::Node& node) {
   } catch (const InputError& error) {
     throw InputError(file.string() + ": " + error.what());
   }
+  camera.baseline = read.get<double>("baseline", camera.baseline);
   // No default: a wrong one would scale the whole map.
-  if (!node["depth_units_per_metre"]) {
+  if (!node["depth_units_per_metre"] && !camera.is_stereo()) {
     throw InputError(file.string() + ": camera file has no 'depth_units_per_metre'; add it: " +
                      std::string(usual_depth_units()));
   }
-  camera.depth_units_per_metre = depth_units_of(file, node);
+  if (node["depth_units_per_metre"]) camera.depth_units_per_metre = depth_units_of(file, node);
   camera.fps = read.get<double>("fps", camera.fps);
   if (node["depth_noise"]) camera.depth_noise = depth_noise_of(file, node["depth_noise"]);
   if (node["imu"]) camera.imu = imu_of(file, node["imu"]);
@@ -191,6 +193,7 @@ std::string camera_to_yaml(const Camera& camera) {
   out << YAML::Key << "depth_units_per_metre" << YAML::Value;
   out << (camera.depth_units_per_metre > 0.0 ? exact(camera.depth_units_per_metre) : kNoUnits);
   out << YAML::Key << "fps" << YAML::Value << exact(camera.fps);
+  if (camera.is_stereo()) out << YAML::Key << "baseline" << YAML::Value << exact(camera.baseline);
   if (camera.depth_noise) {
     out << YAML::Key << "depth_noise" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key
         << "constant" << YAML::Value << exact(camera.depth_noise->constant) << YAML::Key << "growth"

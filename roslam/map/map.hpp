@@ -192,7 +192,8 @@ class ROSLAM_EXPORT Map {
   Measurement measurement(const ObservedFrame& view, std::uint32_t point,
                           const MeasurementNoise& noise) const {
     return Measurement::make(view.pixels[point], view.depths[point], scale(view.levels[point]),
-                             noise.known_of(view.pixel_sigma, view.depth_noise));
+                             noise.known_of(view.pixel_sigma, view.depth_noise),
+                             view.inverse_depth_sigma(point));
   }
 
   /// Pyramid level at which a landmark is expected from a distance (metres).

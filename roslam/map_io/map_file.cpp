@@ -16,7 +16,7 @@ namespace roslam {
 namespace {
 // Version 2 has the measurement noise at the end, version 3 the lens after it. A map is written in the lowest
 // version that holds it, so that earlier programs read it.
-constexpr std::uint32_t kWithoutNoise = 1, kWithNoise = 2, kWithLens = 3;
+constexpr std::uint32_t kWithoutNoise = 1, kWithNoise = 2, kWithLens = 3, kWithStereo = 4;
 constexpr std::size_t kFirstCoefficients = 5;  // of the lens, in every version
 
 constexpr BinaryFormat format(std::uint32_t version) {
@@ -128,6 +128,7 @@ void put_noise(BinaryWriter& writer, const SavedMap& saved) {
 
 std::uint32_t version_of(const SavedMap& saved) {
   const Camera& camera = saved.camera;
+  if (camera.is_stereo()) return kWithStereo;
   if (camera.model != LensModel::kPinhole || camera.coefficients().size() > kFirstCoefficients)
     return kWithLens;
   return has_noise(saved) ? kWithNoise : kWithoutNoise;
@@ -137,6 +138,14 @@ void put_lens(BinaryWriter& writer, const Camera& camera) {
   writer.put(static_cast<std::uint32_t>(camera.model));
   for (std::size_t i = kFirstCoefficients; i < camera.distortion.size(); ++i)
     writer.put(camera.distortion[i]);
+}
+
+void put_stereo(BinaryWriter& writer, const SavedMap& saved) {
+  writer.put(saved.camera.baseline);
+  for (const KeyframeId id : saved.map.keyframe_ids()) {
+    const ObservedFrame& view = *saved.map.find(id)->view;
+    for (std::size_t i = 0; i < view.size(); ++i) writer.put(view.inverse_depth_sigma(i));
+  }
 }
 
 // Decodes a map and validates every value, so that any file gives a valid map or an error.
@@ -172,6 +181,7 @@ class Decoder {
     }
     if (in_.left() > 0) get_noise(saved.camera, views);
     if (in_.left() > 0) get_lens(saved.camera);
+    if (in_.left() > 0) get_stereo(saved.camera, views);
     require(in_.left() == 0, "it has data after its end");
     require_valid(saved.camera);
     const std::array<double, 4> bounds = saved.camera.undistorted_bounds();
@@ -266,6 +276,16 @@ class Decoder {
     camera.model = static_cast<LensModel>(model);
     for (std::size_t i = kFirstCoefficients; i < camera.distortion.size(); ++i)
       camera.distortion[i] = get_finite<double>();
+  }
+
+  void get_stereo(Camera& camera, const std::vector<std::shared_ptr<ObservedFrame>>& views) {
+    camera.baseline = get_finite<double>();
+    for (const auto& view : views) {
+      for (std::size_t i = 0; i < view->size(); ++i) {
+        view->inverse_depth_sigmas.push_back(get_finite<float>());
+        require(view->inverse_depth_sigmas.back() >= 0.0F, "it contains a negative deviation");
+      }
+    }
   }
 
   void require_valid(const Camera& camera) const {
@@ -389,6 +409,7 @@ std::string encode_map(const SavedMap& saved) {
   const std::uint32_t version = version_of(saved);
   if (version >= kWithNoise) put_noise(writer, saved);
   if (version >= kWithLens) put_lens(writer, saved.camera);
+  if (version >= kWithStereo) put_stereo(writer, saved);
   return std::move(writer).bytes();
 }
 
@@ -401,7 +422,7 @@ void save_map(const std::filesystem::path& file, const SavedMap& saved) {
 }
 
 SavedMap load_map(const std::filesystem::path& file) {
-  return decode_map(read_binary(file, format(kWithLens)), file.string());
+  return decode_map(read_binary(file, format(kWithStereo)), file.string());
 }
 
 }  // namespace roslam

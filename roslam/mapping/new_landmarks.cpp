@@ -50,13 +50,14 @@ std::vector<LandmarkId> landmarks_from_depth(Map& map, KeyframeId id, const Came
                                              const NewLandmarkOptions& options) {
   const Keyframe& keyframe = *map.find(id);
   const SE3 T_world_camera = keyframe.T_camera_world.inverse();
-  const DepthNoise depth_noise = keyframe.view->depth_noise.value_or(noise.depth_noise());
+  const ObservedFrame& view = *keyframe.view;
   std::vector<LandmarkId> created;
   for (const std::uint32_t i : free_points(keyframe)) {
-    const double depth = keyframe.view->depths[i];
-    if (depth <= 0.0 || depth_noise.sigma(depth) > options.max_relative_depth_sigma * depth) continue;
-    const Eigen::Vector3d position =
-        T_world_camera * camera.unproject(keyframe.view->pixels[i].cast<double>(), depth);
+    const double depth = view.depths[i];
+    const bool is_sure =
+        depth > 0.0 && view.relative_depth_sigma(i, noise.depth_noise()) <= options.max_relative_depth_sigma;
+    if (!is_sure) continue;
+    const Eigen::Vector3d position = T_world_camera * camera.unproject(view.pixels[i].cast<double>(), depth);
     created.push_back(map.add_landmark(position, id, i));
   }
   return created;

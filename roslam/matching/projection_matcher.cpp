@@ -47,6 +47,19 @@ std::optional<Prediction> predict(const Landmark& landmark, const Map& map, cons
   return Prediction{pixel, static_cast<float>(point.z()), map.predict_level(landmark, distance), cosine};
 }
 
+// Whether the depth of a point is not that of the query. That of stereo may be far less certain than the
+// tolerance.
+bool ProjectionMatcher::is_elsewhere(const Query& query, const ObservedFrame& frame, std::size_t point) const {
+  const float depth = frame.depths[point];
+  if (!(query.depth > 0.0F && depth > 0.0F)) return false;
+  constexpr float kSigmas = 3.0F;
+  const auto tolerance = static_cast<float>(options_.depth_tolerance);
+  const float sigma = frame.inverse_depth_sigma(point);
+  if (sigma > 0.0F)
+    return std::abs(1.0F / depth - 1.0F / query.depth) > tolerance / query.depth + kSigmas * sigma;
+  return std::abs(depth - query.depth) > tolerance * query.depth;
+}
+
 int ProjectionMatcher::find(const Query& query, const Descriptor& descriptor, const ObservedFrame& frame,
                             const std::vector<LandmarkId>& taken) {
   nearby_.clear();
@@ -55,11 +68,7 @@ int ProjectionMatcher::find(const Query& query, const Descriptor& descriptor, co
   for (const std::uint32_t i : nearby_) {
     if (frame.levels[i] < query.min_level || frame.levels[i] > query.max_level || taken[i].is_valid())
       continue;
-    const float depth = frame.depths[i];
-    if (query.depth > 0.0F && depth > 0.0F &&
-        std::abs(depth - query.depth) > static_cast<float>(options_.depth_tolerance) * query.depth) {
-      continue;
-    }
+    if (is_elsewhere(query, frame, i)) continue;
     candidates_.push_back(i);
   }
   const NearestTwo nearest = nearest_two(descriptor, frame.descriptors, candidates_);

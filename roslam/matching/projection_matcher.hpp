@@ -49,6 +49,8 @@ class ProjectionMatcher {
   const MatcherOptions& options() const { return options_; }
 
  private:
+  bool is_elsewhere(const Query& query, const ObservedFrame& frame, std::size_t point) const;
+
   MatcherOptions options_;
   std::vector<std::uint32_t> nearby_;
   std::vector<std::uint32_t> candidates_;

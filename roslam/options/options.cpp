@@ -16,6 +16,7 @@ void ThreadOptions::validate() const {
 void Options::validate() const {
   orb.validate();
   depth.validate();
+  stereo.validate();
   noise.validate();
   segmenter.validate();
   dynamic_objects.validate();

@@ -16,6 +16,7 @@
 #include "roslam/place_recognition/geometric_verifier_options.hpp"
 #include "roslam/restoration/restoration_options.hpp"
 #include "roslam/semantics/segmenter_options.hpp"
+#include "roslam/stereo/stereo_options.hpp"
 #include "roslam/tracking/tracking_options.hpp"
 
 namespace roslam {
@@ -33,6 +34,7 @@ struct ROSLAM_EXPORT ThreadOptions {
 struct ROSLAM_EXPORT Options {
   OrbOptions orb;
   DepthOptions depth;
+  StereoOptions stereo;
   MeasurementNoise noise;
   SegmenterOptions segmenter;
   DynamicObjectOptions dynamic_objects;

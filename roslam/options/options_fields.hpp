@@ -19,6 +19,12 @@ void for_each_option(OptionsType& o, Visitor&& visit) {
   visit("depth", "max_depth", o.depth.max_depth);
   visit("depth", "edge_ratio", o.depth.edge_ratio);
   visit("depth", "edge_growth", o.depth.edge_growth);
+  visit("stereo", "min_depth", o.stereo.min_depth);
+  visit("stereo", "min_correlation", o.stereo.min_correlation);
+  visit("stereo", "uniqueness", o.stereo.uniqueness);
+  visit("stereo", "disparity_sigma", o.stereo.disparity_sigma);
+  visit("stereo", "every_frame", o.stereo.every_frame);
+  visit("stereo", "dense_scale", o.stereo.dense_scale);
   visit("noise", "pixel_sigma", o.noise.pixel_sigma);
   visit("noise", "depth_sigma", o.noise.depth_sigma);
   visit("noise", "depth_sigma_growth", o.noise.depth_sigma_growth);

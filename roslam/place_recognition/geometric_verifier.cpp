@@ -157,13 +157,16 @@ std::optional<VerifiedMatch> GeometricVerifier::recognise(const KeyframeSnapshot
   if (static_cast<int>(matches.size()) < options.min_matches) return std::nullopt;
   std::vector<std::size_t> entry_of(snapshot.view->size());  // position of each point in snapshot.points
   for (std::size_t k = 0; k < snapshot.points.size(); ++k) entry_of[snapshot.points[k]] = k;
+  constexpr float kSure = 0.1F;  // of the depth
   std::vector<PointPair> pairs;
   for (const auto& [in_keyframe, in_frame] : matches) {
     const Eigen::Vector2d pixel = frame.pixels[in_frame].cast<double>();
     const auto z = static_cast<double>(frame.depths[in_frame]);
-    const double tolerance = 2.0 * settings_.noise.sigma_of_depth(z) + z * options.max_error / camera_.fx;
+    const double of_stereo = z * z * frame.inverse_depth_sigma(in_frame);
+    const double sigma = of_stereo > 0.0 ? of_stereo : settings_.noise.sigma_of_depth(z);
+    const double tolerance = 2.0 * sigma + z * options.max_error / camera_.fx;
     pairs.push_back({snapshot.positions[entry_of[in_keyframe]], camera_.unproject(pixel, z), pixel,
-                     z > 0.0 ? tolerance : std::numeric_limits<double>::infinity(),
+                     frame.has_depth(in_frame, kSure) ? tolerance : std::numeric_limits<double>::infinity(),
                      frame.angles[in_frame] - snapshot.view->angles[in_keyframe]});
   }
   SE3 T_camera_world;
@@ -232,7 +235,8 @@ void GeometricVerifier::fit(const Map& map, const ObservedFrame& frame, Verified
     // map.
     measurements.push_back(
         {landmark->position,
-         Measurement::make(frame.pixels[i], frame.depths[i], map.scale(frame.levels[i]), settings_.noise)});
+         Measurement::make(frame.pixels[i], frame.depths[i], map.scale(frame.levels[i]), settings_.noise,
+                           frame.inverse_depth_sigma(i))});
     points.push_back(i);
   }
   const OptimisedPose pose = optimise_pose(camera_, measurements, match.T_camera_world, settings_.pose);

@@ -3,23 +3,34 @@
 
 #include <algorithm>
 
+#include <opencv2/imgproc.hpp>
+
 #include "roslam/sensors/image_file.hpp"
 
 namespace roslam {
 
 cv::Mat FrameImages::colour(const std::filesystem::path& file, const cv::Size& camera) {
+  return read(file, camera, "colour image ", skipped);
+}
+
+cv::Mat FrameImages::right(const std::filesystem::path& file, const cv::Size& camera) {
+  cv::Mat grey;
+  const cv::Mat image = read(file, camera, "right image ", skipped_depth);
+  if (!image.empty()) cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+  return grey;
+}
+
+cv::Mat FrameImages::read(const std::filesystem::path& file, const cv::Size& camera, const std::string& kind,
+                          Counts& unused) {
   const ImageFile read = read_colour_image(file, bits_);
-  if (!read.error.empty()) {
-    ++skipped["colour image " + read.error];
-    return {};
+  if (read.error.empty() && read.image.size() == camera) {
+    bits_ = std::max(bits_, read.bits);
+    return read.image;
   }
-  if (read.image.size() != camera) {
-    ++skipped["colour image is " + size_in_words(read.image.size()) + " but the camera " +
-              size_in_words(camera) + " pixels"];
-    return {};
-  }
-  bits_ = std::max(bits_, read.bits);
-  return read.image;
+  ++unused[kind + (read.error.empty() ? "is " + size_in_words(read.image.size()) + " but the camera " +
+                                            size_in_words(camera) + " pixels"
+                                      : read.error)];
+  return {};
 }
 
 cv::Mat FrameImages::depth(const std::filesystem::path& file, double units_per_metre, const cv::Size& size,

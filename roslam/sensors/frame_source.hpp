@@ -11,13 +11,13 @@
 #include <vector>
 
 #include "roslam/common/export.hpp"
-#include "roslam/geometry/camera.hpp"
 #include "roslam/geometry/se3.hpp"
+#include "roslam/geometry/stereo_rig.hpp"
 #include "roslam/sensors/inertial_sample.hpp"
 
 namespace roslam {
 
-/// One RGB-D frame.
+/// One RGB-D or stereo frame.
 struct ROSLAM_EXPORT Frame {
   std::size_t index = 0;   ///< position in the source, counted from 0; skipped frames leave gaps
   double timestamp = 0.0;  ///< seconds, as given by the source
@@ -25,6 +25,7 @@ struct ROSLAM_EXPORT Frame {
   int segment = 0;  ///< restarts of the source's clock before this frame, as far as the source knows
   cv::Mat colour;   ///< CV_8UC3, BGR, raw (distorted)
   cv::Mat depth;    ///< CV_32FC1, metres along the optical axis, 0 = unknown; registered to colour
+  cv::Mat right;    ///< CV_8UC1, grey, of the right camera of a stereo pair; empty: none
   cv::Mat labels;   ///< CV_8UC1 class of each pixel if the source knows it, else empty
   std::vector<InertialSample>
       inertial;  ///< since the frame before, in order of time; Camera::imu says how fixed
@@ -58,6 +59,10 @@ class ROSLAM_EXPORT FrameSource {
 
   virtual const Camera& camera() const = 0;
 
+  /// The right camera of stereo pairs that are not rectified (RectifiedSource does it); a camera with a
+  /// baseline is that of pairs that are.
+  virtual std::optional<RightCamera> right() const { return std::nullopt; }
+
   /// Number of frames in the source, skipped ones included, if known.
   virtual std::optional<std::size_t> size() const { return std::nullopt; }
 
@@ -67,7 +72,7 @@ class ROSLAM_EXPORT FrameSource {
   /// What the source found out about its data and how often, in words, such as a list that was not sorted.
   virtual std::map<std::string, std::size_t> notes() const { return {}; }
 
-  /// Depth images that could not be used so far, by reason in words; their frames have an empty depth.
+  /// Depth images and right images that could not be used so far, by reason; their frames are without.
   virtual std::map<std::string, std::size_t> skipped_depth() const { return {}; }
 };
 

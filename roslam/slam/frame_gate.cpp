@@ -30,6 +30,8 @@ RejectReason FrameGate::check_images(const Frame& frame, const cv::Mat& mask) co
   if (frame.colour.size() != size_) return RejectReason::kColourSize;
   if (!frame.depth.empty() && frame.depth.type() != CV_32FC1) return RejectReason::kDepthType;
   if (!frame.depth.empty() && frame.depth.size() != size_) return RejectReason::kDepthSize;
+  if (!frame.right.empty() && (frame.right.type() != CV_8UC1 || frame.right.size() != size_))
+    return RejectReason::kRightImage;
   if (!mask.empty() && (mask.type() != CV_8UC1 || mask.size() != size_)) return RejectReason::kMask;
   return RejectReason::kNone;
 }

@@ -19,6 +19,8 @@ std::string_view describe(RejectReason reason) {
       return "depth image is not 32-bit float";
     case RejectReason::kDepthSize:
       return "depth image size differs from the colour image's";
+    case RejectReason::kRightImage:
+      return "right image is not 8-bit grey of the left image's size";
     case RejectReason::kMask:
       return "mask is not 8-bit of the colour image's size";
     case RejectReason::kTimeNotFinite:

@@ -26,6 +26,7 @@ enum class RejectReason {
   kColourSize,         ///< colour image size differs from the camera's
   kDepthType,          ///< depth image is not 32-bit float
   kDepthSize,          ///< depth image size differs from the colour image's
+  kRightImage,         ///< right image of a stereo pair is not 8-bit grey of the colour image's size
   kMask,               ///< the mask given with the frame is not 8-bit or not of its size
   kTimeNotFinite,      ///< the timestamp is not a number
   kTimeNotIncreasing,  ///< the timestamp is not later than that of the last frame that was used

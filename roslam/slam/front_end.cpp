@@ -21,10 +21,14 @@ FrontEnd::FrontEnd(const Camera& camera, const Options& options, Mode mode,
       noise_(camera, options.noise),
       segmentation_(options.dynamic_objects.labels ? std::move(segmenter) : nullptr, mode, options.threads),
       detector_(camera, detector_settings(options)),
-      extractor_(options.orb) {}
+      extractor_(options.orb) {
+  if (camera.is_stereo()) stereo_.emplace(camera, options.stereo);
+}
 
-bool FrontEnd::detects() const {
-  return segmentation_.is_on() || options_.dynamic_objects.depth_consistency || options_.dynamic_objects.flow;
+bool FrontEnd::detects() const { return segmentation_.is_on() || needs_depth(); }
+
+bool FrontEnd::needs_depth() const {
+  return options_.dynamic_objects.depth_consistency || options_.dynamic_objects.flow;
 }
 
 FrontEndResult FrontEnd::observe(const Frame& frame, const cv::Mat& mask,
@@ -67,7 +71,7 @@ bool FrontEnd::fills_image(const Frame& frame, const FrontEndResult& observation
 }
 
 void FrontEnd::check_input(const Frame& frame, const cv::Mat& grey, FrontEndResult& observation) {
-  depth_check_.add(grey, frame.depth, frame.timestamp);
+  if (!stereo_) depth_check_.add(grey, frame.depth, frame.timestamp);
   const auto all = warnings();
   for (const auto& [warning, frames] : all) {
     if (warned_.insert(warning).second) observation.warnings.push_back(warning);
@@ -105,7 +109,8 @@ void FrontEnd::extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& m
     forbidden = forbidden.empty() ? mask : cv::Mat(forbidden | mask);
     if (!still.empty()) still = still & ~(mask != 0);
   }
-  auto features = extractor_.extract(grey, forbidden, still, &result.removed_points);
+  const std::vector<cv::Mat> pyramid = extractor_.pyramid(grey);
+  auto features = extractor_.extract(pyramid, forbidden, still, &result.removed_points);
   // Beyond the part of the image that the lens model covers.
   std::erase_if(features, [&](const OrbFeature& feature) {
     return !camera_.try_undistort(Eigen::Vector2d(feature.pixel.x, feature.pixel.y));
@@ -114,7 +119,11 @@ void FrontEnd::extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& m
     if (!feature.is_in_part) result.points.push_back(feature.pixel);
   }
   auto view = std::make_shared<ObservedFrame>(
-      roslam::observe(features, frame.colour, frame.depth, camera_, options_.depth));
+      roslam::observe(features, frame.colour, stereo_ ? cv::Mat() : frame.depth, camera_, options_.depth));
+  if (stereo_ && !frame.right.empty()) {
+    const auto right = extractor_.pyramid(brightness_.apply(frame.right));
+    stereo_->set_depths(stereo_->match(features, pyramid, right), *view);
+  }
   if (!resting.empty() || !still.empty()) {
     for (const auto& feature : features) {
       const cv::Point pixel(std::min(cvRound(feature.pixel.x), grey.cols - 1),

@@ -19,6 +19,7 @@
 #include "roslam/sensors/depth_check.hpp"
 #include "roslam/sensors/frame_source.hpp"
 #include "roslam/slam/camera_noise.hpp"
+#include "roslam/features/stereo_matcher.hpp"
 #include "roslam/tracking/tracker.hpp"
 #include "roslam/workers/load_control.hpp"
 #include "roslam/workers/segmentation_worker.hpp"
@@ -51,6 +52,9 @@ class FrontEnd {
 
   /// True if dynamic objects are detected at all.
   bool detects() const;
+
+  /// True if they are detected by depth.
+  bool needs_depth() const;
 
   /// predicted_T_camera_world: pose that the motion so far suggests, if known. mask: empty, or CV_8UC1 of the
   /// frame's size, nonzero where no feature may be extracted. frame_count: frames used so far.
@@ -107,6 +111,7 @@ class FrontEnd {
   SegmentationWorker segmentation_;
   DynamicObjectDetector detector_;
   OrbExtractor extractor_;
+  std::optional<StereoMatcher> stereo_;  // of a stereo camera
   cv::Mat labels_;
   std::size_t labelled_index_ = 0;
   int last_inliers_ = 0;

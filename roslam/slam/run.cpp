@@ -4,7 +4,7 @@
 #include <chrono>
 #include <exception>
 
-#include "roslam/sensors/paced_reader.hpp"
+#include "roslam/workers/paced_reader.hpp"
 
 namespace roslam {
 

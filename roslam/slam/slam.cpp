@@ -193,6 +193,7 @@ StageTimes Slam::times() const {
   all.add_all(impl_->mapping.times());
   all.add_all(impl_->closing.times());
   all.add_all(impl_->front_end.times());
+  if (impl_->stereo_depth) all.add_all(impl_->stereo_depth->times());
   if (impl_->restoration) all.add_all(impl_->restoration->times());
   if (impl_->dense) all.add_all(impl_->dense->times());
   return all;

@@ -19,6 +19,12 @@ const Camera& validated(const Camera& camera) {
   return camera;
 }
 
+// Of a stereo camera whose depth noise is not known: as its baseline lets expect.
+Camera with_depth_noise(Camera camera, const StereoOptions& options) {
+  if (camera.is_stereo() && !camera.depth_noise) camera.depth_noise = dense_stereo_noise(camera, options);
+  return camera;
+}
+
 const Options& validated(const Options& options) {
   options.validate();
   return options;
@@ -35,7 +41,7 @@ Tracker::Settings settings_of_tracker(const Options& options, bool has_vocabular
 
 Slam::Impl::Impl(const Camera& the_camera, const Options& the_options, Mode the_mode,
                  std::shared_ptr<Segmenter> segmenter, std::shared_ptr<const Vocabulary> vocabulary)
-    : camera(validated(the_camera)),
+    : camera(with_depth_noise(validated(the_camera), the_options.stereo)),
       options(validated(the_options)),
       mode(the_mode),
       gate(camera),
@@ -52,6 +58,12 @@ Slam::Impl::Impl(const Camera& the_camera, const Options& the_options, Mode the_
       closing([this](auto&&... work) { close_loops(work...); }, mode, kInterruptGlobalBundle,
               KeyframeWorker::OnFailure::kSwitchOff),
       mapping([this](auto&&... work) { map_keyframe(work...); }, mode, 1) {
+  if (camera.is_stereo()) {
+    dense_stereo.emplace(camera, options.stereo);
+    stereo_depth.emplace(
+        *dense_stereo, mode, options.threads.keyframe_queue,
+        [this](KeyframeId keyframe, DenseInput input) { hand_on(keyframe, std::move(input)); });
+  }
   if (vocabulary == nullptr || !options.loop.enabled) return;
   keyframe_database.emplace(std::move(vocabulary));
   loop_closer.emplace(camera, map, *keyframe_database, map_mutex, loop_settings(options));
@@ -65,20 +77,29 @@ FrameResult Slam::Impl::process(const Frame& frame, const cv::Mat& mask) {
   return result;
 }
 
-FrameResult Slam::Impl::track(const Frame& frame, const cv::Mat& mask) {
+// Where dynamic objects are detected by depth, each frame of a stereo pair needs it.
+Frame Slam::Impl::with_depth(const Frame& frame) {
+  if (!dense_stereo || !options.stereo.every_frame || !front_end.needs_depth()) return frame;
+  const Stopwatch watch;
+  Frame result = dense_stereo->with_depth(frame);
+  times.add("tracking.dense_stereo", watch.seconds());
+  return result;
+}
+
+FrameResult Slam::Impl::track(const Frame& given, const cv::Mat& mask) {
   mapping.check();
   FrameResult result;
-  result.received = frame.received.value_or(std::chrono::steady_clock::now());
-  result.index = frame.index;
-  result.timestamp = frame.timestamp;
-  const auto verdict = gate.check(frame, mask);
+  result.received = given.received.value_or(std::chrono::steady_clock::now());
+  result.index = given.index;
+  result.timestamp = given.timestamp;
+  const auto verdict = gate.check(given, mask);
   result.rejected = verdict.reason;
   if (!options.keyframes.enabled && map.keyframe_count() == 0)
     result.rejected = RejectReason::kNoMapToLocaliseIn;
   result.state = tracker.state();
-  if (verdict.is_clock_reset) restart_clock(frame.timestamp);
-  tracker.add_inertial(frame.inertial, frame.timestamp);
-  level.add_inertial(frame.inertial);
+  if (verdict.is_clock_reset) restart_clock(given.timestamp);
+  tracker.add_inertial(given.inertial, given.timestamp);
+  level.add_inertial(given.inertial);
   if (!result.is_used()) {
     log.add_rejected(result.rejected);
     return result;
@@ -86,6 +107,7 @@ FrameResult Slam::Impl::track(const Frame& frame, const cv::Mat& mask) {
   const Stopwatch watch;
   const auto begun = std::chrono::steady_clock::now();
   result.is_clock_reset = verdict.is_clock_reset;
+  const Frame frame = with_depth(given);
   FrontEndResult observation = front_end.observe(frame, mask, predict_pose(frame.timestamp), log.frames());
   result.dynamic_objects = std::move(observation.dynamic_objects);
   result.warnings = std::move(observation.warnings);

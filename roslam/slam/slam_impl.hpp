@@ -19,6 +19,7 @@
 #include "roslam/slam/live_map.hpp"
 #include "roslam/slam/slam.hpp"
 #include "roslam/slam/trajectory_log.hpp"
+#include "roslam/stereo/dense_stereo.hpp"
 #include "roslam/tracking/keyframe_policy.hpp"
 #include "roslam/tracking/tracker.hpp"
 #include "roslam/workers/callback_queue.hpp"
@@ -26,6 +27,7 @@
 #include "roslam/workers/keyframe_worker.hpp"
 #include "roslam/workers/load_control.hpp"
 #include "roslam/workers/restoration_worker.hpp"
+#include "roslam/workers/stereo_depth_worker.hpp"
 
 namespace roslam {
 
@@ -60,7 +62,10 @@ struct Slam::Impl {
   void close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldStop& should_stop, StageTimes& times);
   bool needs_poses() const { return dense || restoration; }
   void publish_poses(MapChangeKind change);
+  Frame with_depth(const Frame& frame);
   void submit(KeyframeId keyframe, const Frame& frame, const DynamicObjects& objects);
+  DenseInput dense_input(KeyframeId keyframe, const Frame& frame, const DynamicObjects& objects);
+  void hand_on(KeyframeId keyframe, DenseInput input);
   bool level_world();
   void fill(FrameResult& result, const TrackedFrame& tracked) const;
   void check_gyroscope(FrameResult& result);
@@ -72,6 +77,7 @@ struct Slam::Impl {
   FrameGate gate;
   LoadControl load;
   FrontEnd front_end;
+  std::optional<DenseStereo> dense_stereo;  // of a stereo camera
   MapMutex map_mutex;
   Map map;
   KeyframePoseTable poses;
@@ -95,6 +101,7 @@ struct Slam::Impl {
   // Last, so that their threads stop before the members they use are destroyed.
   std::optional<DenseWorker> dense;
   std::optional<RestorationWorker> restoration;
+  std::optional<StereoDepthWorker> stereo_depth;  // of keyframes
   KeyframeWorker closing;
   KeyframeWorker mapping;
 };

@@ -69,22 +69,37 @@ void Slam::Impl::close_loops(KeyframeId keyframe, const KeyframeWorker::ShouldSt
 // Hands a keyframe to mapping, restoration and the dense map.
 void Slam::Impl::submit(KeyframeId keyframe, const Frame& frame, const DynamicObjects& objects) {
   mapping.submit(keyframe);
-  if (dense) {
-    DenseInput input;
-    input.frame = frame;
-    input.dynamic_objects = objects;
-    if (const auto noise = front_end.noise().depth()) input.depth_noise = options.noise.at_least(*noise);
-    input.is_restored = restoration && options.dense.restore && options.dense.remove;
-    if (!front_end.labels().empty()) {
-      const MapLock lock(map_mutex, kTracking, true);
-      if (const auto T = log.T_frame_keyframe(map, front_end.labelled_index(), keyframe, kLabelsLast)) {
-        input.labels = front_end.labels();
-        input.has_older_labels = front_end.labelled_index() != frame.index;
-        input.T_labelled_camera = *T;
-      }
-    }
-    dense->submit(keyframe, std::move(input));
+  if (!dense && !restoration) return;
+  DenseInput input = dense_input(keyframe, frame, objects);
+  if (stereo_depth && frame.depth.empty() && !frame.right.empty()) {
+    stereo_depth->submit(keyframe, std::move(input));
+  } else {
+    hand_on(keyframe, std::move(input));
   }
+}
+
+DenseInput Slam::Impl::dense_input(KeyframeId keyframe, const Frame& frame, const DynamicObjects& objects) {
+  DenseInput input;
+  input.frame = frame;
+  input.dynamic_objects = objects;
+  if (!dense) return input;
+  if (const auto noise = front_end.noise().depth()) input.depth_noise = options.noise.at_least(*noise);
+  input.is_restored = restoration && options.dense.restore && options.dense.remove;
+  if (front_end.labels().empty()) return input;
+  const MapLock lock(map_mutex, kTracking, true);
+  if (const auto T = log.T_frame_keyframe(map, front_end.labelled_index(), keyframe, kLabelsLast)) {
+    input.labels = front_end.labels();
+    input.has_older_labels = front_end.labelled_index() != frame.index;
+    input.T_labelled_camera = *T;
+  }
+  return input;
+}
+
+// The dense map takes it first: restoration tells it of the restored keyframe.
+void Slam::Impl::hand_on(KeyframeId keyframe, DenseInput input) {
+  const Frame frame = input.frame;
+  const DynamicObjects objects = input.dynamic_objects;
+  if (dense) dense->submit(keyframe, std::move(input));
   if (restoration) restoration->submit(keyframe, frame, objects);
 }
 
@@ -101,6 +116,7 @@ void Slam::Impl::finish() {
   };
   drain(mapping);
   drain(closing);
+  if (stereo_depth) drain(*stereo_depth);
   if (restoration) drain(*restoration);
   if (dense) drain(*dense);
   callbacks.drain();
@@ -112,6 +128,7 @@ void Slam::Impl::cancel() {
   front_end.cancel();
   mapping.cancel();
   closing.cancel();
+  if (stereo_depth) stereo_depth->cancel();
   if (restoration) restoration->cancel();
   if (dense) dense->cancel();
   callbacks.cancel();

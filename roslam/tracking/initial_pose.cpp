@@ -32,9 +32,9 @@ void InitialPoseEstimator::Matches::keep_consistent_rotation(std::vector<Landmar
 std::optional<Eigen::Vector3d> InitialPoseEstimator::position_of(const TrackedFrame& last, std::size_t point,
                                                                  const SE3& T_world_last) const {
   if (const Landmark* landmark = map_.find(map_.resolve(last.landmarks[point]))) return landmark->position;
-  const float depth = last.view->depths[point];
-  if (depth <= 0.0F) return std::nullopt;
-  return T_world_last * camera_.unproject(last.view->pixels[point].cast<double>(), depth);
+  constexpr float kSure = 0.1F;  // of the depth: the point is taken for exact
+  if (!last.view->has_depth(point, kSure)) return std::nullopt;
+  return T_world_last * camera_.unproject(last.view->pixels[point].cast<double>(), last.view->depths[point]);
 }
 
 std::optional<PoseCandidate> InitialPoseEstimator::from_last_frame(const ObservedFrame& view,

@@ -41,11 +41,15 @@ bool KeyframePolicy::needs_keyframe(const TrackedFrame& frame, const Map& map, b
   const double elapsed = frame.timestamp - last_timestamp_;
   if (elapsed < options_.min_interval) return false;
 
+  constexpr float kNear = 0.1F;  // of the depth: what stereo measures so well is near whatever its distance
+  const ObservedFrame& view = *frame.view;
   int tracked_near = 0;
   int new_near = 0;
   for (std::size_t i = 0; i < frame.landmarks.size(); ++i) {
-    const float depth = frame.view->depths[i];
-    if (depth <= 0.0F || depth > options_.near) continue;
+    const bool is_near = view.inverse_depth_sigma(i) > 0.0F
+                             ? view.has_depth(i, kNear)
+                             : view.depths[i] > 0.0F && view.depths[i] <= options_.near;
+    if (!is_near) continue;
     ++(frame.landmarks[i].is_valid() ? tracked_near : new_near);
   }
   const bool needs_near = tracked_near < options_.min_tracked_near && new_near > options_.min_new_near;

@@ -9,6 +9,7 @@ std::vector<TemporaryPoint> match_resting_points(const Map& map, const Camera& c
                                                  const std::vector<std::uint32_t>& used,
                                                  ProjectionMatcher& matcher) {
   constexpr float kRadius = 4.0F;  // times matcher.map_radius
+  constexpr float kSure = 0.1F;    // of the depth: the point is taken for exact
   constexpr LandmarkId kTaken{LandmarkId::kNone - 1};
   std::vector<LandmarkId> taken(view.size());
   for (const std::uint32_t point : used) taken[point] = kTaken;
@@ -19,7 +20,7 @@ std::vector<TemporaryPoint> match_resting_points(const Map& map, const Camera& c
     if (theirs.is_movable.empty()) continue;
     const SE3 T_world_keyframe = keyframe.T_camera_world.inverse();
     for (std::uint32_t i = 0; i < theirs.size(); ++i) {
-      if (!theirs.may_move(i) || theirs.depths[i] <= 0.0F || keyframe.landmarks[i].is_valid()) continue;
+      if (!theirs.may_move(i) || !theirs.has_depth(i, kSure) || keyframe.landmarks[i].is_valid()) continue;
       const Eigen::Vector3d position =
           T_world_keyframe * camera.unproject(theirs.pixels[i].cast<double>(), theirs.depths[i]);
       const Eigen::Vector3d in_camera = T_camera_world * position;

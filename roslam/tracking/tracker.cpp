@@ -98,8 +98,9 @@ void Tracker::withhold_poor_fit(TrackedFrame& frame) {
 
 bool Tracker::can_start(const TrackedFrame& frame, const FrameHint& hint) {
   const ObservedFrame& view = *frame.view;
+  constexpr float kSure = 0.2F;  // of the depth: of such points landmarks are made
   int known = 0;
-  for (std::size_t i = 0; i < view.size(); ++i) known += view.depths[i] > 0.0F && !view.may_move(i) ? 1 : 0;
+  for (std::size_t i = 0; i < view.size(); ++i) known += view.has_depth(i, kSure) && !view.may_move(i) ? 1 : 0;
   if (known < settings_.tracker.min_initial_points) return false;
   if (hint.may_start) {
     waits_since_.reset();

@@ -30,7 +30,9 @@ std::unique_ptr<FrameSource> open_source_of(const recording::RunSource& run) {
   const SourceArguments arguments = flight_from_words(run.name, run.flight);
   if (is_simulated) return std::make_unique<SimulatedSource>(*simulated_flight(arguments));
   if (is_recorded(run.name)) return std::make_unique<RecordingSource>(run.name, arguments.topics, run.camera);
-  if (is_other_dataset(run.name)) return open_dataset(run.name, run.camera);
+  // The camera of a run on stereo pairs is that of the rectified ones.
+  if (is_other_dataset(run.name))
+    return open_dataset(run.name, run.camera.is_stereo() ? std::nullopt : std::optional(run.camera));
   return std::make_unique<TumSource>(run.name, run.camera);
 }
 

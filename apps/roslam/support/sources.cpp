@@ -43,6 +43,7 @@ void for_each_flight_option(Arguments& arguments, const Visitor& visit) {
   visit("fps", arguments.fps);
   visit("gusts", arguments.gusts);
   visit("imu", arguments.imu);
+  visit("stereo", arguments.stereo);
   visit("gain", arguments.gain);
 }
 }  // namespace
@@ -131,6 +132,8 @@ void add_flight_options(CLI::App& command, SourceArguments& arguments) {
           "inertial samples of a recording")
       ->type_name("[TOPIC]")
       ->expected(0, 1);
+  command.add_flag("--stereo", arguments.stereo,
+                   "A simulated flight has a second camera, 0.12 m to the right, and no depth camera");
   command.add_option("--gain", arguments.gain, "Factor of the image brightness of a simulated flight")
       ->capture_default_str();
 }
@@ -176,6 +179,7 @@ std::optional<SimulatorOptions> simulated_flight(const SourceArguments& argument
   options.fps = arguments.fps;
   options.gusts = arguments.gusts;
   options.imu = arguments.imu;
+  options.stereo = arguments.stereo;
   options.gain = arguments.gain;
   return options;
 }

@@ -30,6 +30,7 @@ struct SourceArguments {
   double aside = 0.0;            ///< metres to the left of the default path
   double fps = 30.0;             ///< frames a second
   bool imu = false;              ///< a simulated flight has inertial samples
+  bool stereo = false;           ///< a simulated flight has stereo pairs in place of depth
   double gusts = 0.0;            ///< of wind; 1 turns the drone at up to 60 degrees a second
   double gain = 1.0;             ///< factor of the image brightness
   std::string degrade = "none";  ///< a name of simulation::degradation_names(), of any source

@@ -9,8 +9,8 @@
 #include <optional>
 #include <thread>
 
-#include "roslam/sensors/frame_queue.hpp"
 #include "roslam/sensors/frame_source.hpp"
+#include "roslam/workers/frame_queue.hpp"
 
 namespace roslam {
 

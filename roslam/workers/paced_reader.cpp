@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/sensors/paced_reader.hpp"
+#include "roslam/workers/paced_reader.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "roslam/sensors/frame_queue.hpp"
+#include "roslam/workers/frame_queue.hpp"
 
 #include <algorithm>
 #include <utility>
