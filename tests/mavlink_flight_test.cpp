@@ -11,6 +11,7 @@
 #include "roslam/slam/run.hpp"
 #include "simulation/simulated_source.hpp"
 #include "telemetry/mavlink/mavlink_sender.hpp"
+#include "tests/blinded_source.hpp"
 #include "tests/program.hpp"
 #include "tests/scratch.hpp"
 #include "tests/stand_in_autopilot.hpp"
@@ -20,37 +21,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A flight whose camera shows nothing for a while.
-class BlindedSource : public FrameSource {
- public:
-  BlindedSource(std::size_t from, std::size_t to) : source_(options()), from_(from), to_(to) {}
-
-  std::optional<Frame> next() override {
-    auto frame = source_.next();
-    if (frame && frame->index >= from_ && frame->index < to_) {
-      frame->colour = cv::Mat::zeros(frame->colour.size(), frame->colour.type());
-      frame->depth = cv::Mat::zeros(frame->depth.size(), frame->depth.type());
-    }
-    return frame;
-  }
-  const Camera& camera() const override { return source_.camera(); }
-
- private:
-  static simulation::SimulatorOptions options() {
-    simulation::SimulatorOptions options;
-    options.path = simulation::FlightPath::kStreet;
-    options.traffic = simulation::TrafficLevel::kNone;
-    options.frames = 90;
-    return options;
-  }
-
-  simulation::SimulatedSource source_;
-  std::size_t from_, to_;
-};
-
 TEST(MavlinkFlight, IsSilentWhileTheCameraIsBlindAndRaisesTheCounter) {
   const StandInAutopilot autopilot;
-  BlindedSource source(40, 55);
+  simulation::SimulatorOptions flight;
+  flight.traffic = simulation::TrafficLevel::kNone;
+  flight.frames = 90;
+  simulation::SimulatedSource street(flight);
+  simulation::BlindedSource source(street, 40, 55);
   Options slam_options;
   slam_options.dynamic_objects = *options_of_mode("none", slam_options.dynamic_objects);
   slam_options.dense.enabled = false;
@@ -71,8 +48,7 @@ TEST(MavlinkFlight, IsSilentWhileTheCameraIsBlindAndRaisesTheCounter) {
   EXPECT_GT(resets, 0U);
   EXPECT_GT(with_pose.size(), 60U);
   EXPECT_LE(with_pose.size(), 75U);
-  for (int i = 0; i < 1000 && autopilot.heard().size() < sender.report().sent; ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_TRUE(comes([&] { return autopilot.heard().size() == sender.report().sent; }));
   const auto poses = autopilot.all<OdometryMessage>();
   ASSERT_EQ(poses.size(), with_pose.size());
   auto time = with_pose.begin();
@@ -121,8 +97,7 @@ TEST_F(MavlinkProgram, SendsWhatItCounts) {
   EXPECT_NE(outcome.out.find("30 poses of "), std::string::npos) << outcome.out;
   const auto json = nlohmann::json::parse(content(folder_ / "run" / "run.json"))["mavlink"];
   const auto sent = json["sent"].get<std::size_t>();
-  for (int i = 0; i < 1000 && autopilot.heard().size() < sent; ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_TRUE(comes([&] { return autopilot.heard().size() == sent; }));
   const auto heard = autopilot.heard();
   EXPECT_EQ(heard.size(), sent);
   for (const auto& one : heard) EXPECT_EQ(one.message.sender, (MavlinkId{7, 42}));

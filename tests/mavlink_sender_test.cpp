@@ -17,14 +17,6 @@ namespace {
 using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
 
-bool comes(const std::function<bool()>& is_there) {
-  for (int i = 0; i < 2000; ++i) {
-    if (is_there()) return true;
-    std::this_thread::sleep_for(milliseconds(10));
-  }
-  return false;
-}
-
 // A frame of a flight at 30 images a second; the camera's clock is not this computer's.
 TrackingReport frame(int index, std::optional<std::size_t> resets, Clock::time_point begun) {
   TrackingReport report;

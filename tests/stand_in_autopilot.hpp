@@ -8,14 +8,27 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <functional>
+#include <limits>
 #include <mutex>
+#include <span>
 #include <stop_token>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include "telemetry/mavlink/mavlink_frame.hpp"
 
 namespace roslam::telemetry {
+
+/// Whether it becomes true within 20 s.
+inline bool comes(const std::function<bool()>& is_there) {
+  for (int i = 0; i < 2000; ++i) {
+    if (is_there()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
 
 /// A UDP socket on this computer that speaks as PX4 does: a heartbeat a second, and ten times a second a
 /// TIMESYNC with tc1 = 0 and ts1 = its time, whose answers give the offset of the other clock. Its own clock
@@ -51,6 +64,11 @@ class StandInAutopilot {
   std::vector<Heard> heard() const {
     const std::scoped_lock lock(mutex_);
     return heard_;
+  }
+  /// All bytes that came, as they came.
+  std::vector<std::uint8_t> bytes() const {
+    const std::scoped_lock lock(mutex_);
+    return bytes_;
   }
   template <typename Message>
   std::vector<Message> all() const {
@@ -94,6 +112,8 @@ class StandInAutopilot {
         peer_ = from;
         peer_size_ = size;
         const std::scoped_lock lock(mutex_);
+        for (const std::uint8_t byte : std::span(bytes).first(static_cast<std::size_t>(count)))
+          bytes_.push_back(byte);
         for (const auto& one : decoder.add({bytes, static_cast<std::size_t>(count)}))
           heard_.push_back({time, one});
       }
@@ -118,6 +138,7 @@ class StandInAutopilot {
   socklen_t peer_size_ = 0;
   mutable std::mutex mutex_;
   std::vector<Heard> heard_;
+  std::vector<std::uint8_t> bytes_;
   std::jthread thread_;
 };
 

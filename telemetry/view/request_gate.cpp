@@ -27,6 +27,7 @@ namespace roslam::telemetry {
 namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::string_view kEndOfHeader = "\r\n\r\n";
+constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 
 [[noreturn]] void fail(const Endpoint& endpoint, int error) {
   const std::string at = "--view " + endpoint.in_words() + ": ";
@@ -150,7 +151,8 @@ void RequestGate::work(const std::stop_token& stop) {
   std::vector<pollfd> polled;
   const Stopwatch watch;
   while (!stop.stop_requested()) {
-    polled = {{listener_.get(), POLLIN, 0}, {wake_.get(), POLLIN, 0}};
+    if (accept_after_ && Clock::now() >= *accept_after_) accept_after_.reset();
+    polled = {{accept_after_ ? -1 : listener_.get(), POLLIN, 0}, {wake_.get(), POLLIN, 0}};
     for (const Connection& connection : waiting_) polled.push_back({connection.socket.get(), POLLIN, 0});
     if (poll(polled.data(), polled.size(), wait_time()) < 0 && errno != EINTR) break;
     eventfd_t count = 0;
@@ -170,12 +172,12 @@ void RequestGate::work(const std::stop_token& stop) {
   listener_.reset();
 }
 
-// Milliseconds to the first deadline; -1: there is none.
+// Milliseconds to the first deadline, or until connections are accepted again; -1: there is none.
 int RequestGate::wait_time() const {
-  if (waiting_.empty()) return -1;
-  const auto first = std::min_element(waiting_.begin(), waiting_.end(),
-                                      [](const auto& a, const auto& b) { return a.deadline < b.deadline; });
-  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(first->deadline - Clock::now());
+  auto first = accept_after_.value_or(Clock::time_point::max());
+  for (const Connection& connection : waiting_) first = std::min(first, connection.deadline);
+  if (first == Clock::time_point::max()) return -1;
+  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(first - Clock::now());
   return static_cast<int>(std::clamp<std::int64_t>(left.count() + 1, 0, 60000));
 }
 
@@ -183,8 +185,13 @@ void RequestGate::accept_all() {
   for (;;) {
     FileDescriptor socket(accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!socket) {
-      // Out of descriptors: the waiting ones are worth less than the flight's files.
-      if ((errno == EMFILE || errno == ENFILE) && !waiting_.empty()) waiting_.pop_front();
+      if (errno != EMFILE && errno != ENFILE && errno != ENOBUFS && errno != ENOMEM) return;
+      // Out of descriptors: the waiting ones are worth less than the flight's files. Where none waits, poll()
+      // would return at once, again and again, as the connection that cannot be accepted stays in the queue.
+      if (waiting_.empty())
+        accept_after_ = Clock::now() + kAcceptPause;
+      else
+        waiting_.pop_front();
       return;
     }
     const int on = 1;

@@ -72,8 +72,10 @@ class RequestGate {
   FileDescriptor listener_;
   FileDescriptor wake_;
   int port_ = 0;
-  std::list<Connection> waiting_;  // used by the gate's thread
-  mutable std::mutex mutex_;       // guards what follows
+  // Used by the gate's thread.
+  std::list<Connection> waiting_;
+  std::optional<std::chrono::steady_clock::time_point> accept_after_;  // no connection is accepted before
+  mutable std::mutex mutex_;                                           // guards what follows
   std::condition_variable changed_;
   std::deque<Connection> whole_;
   std::list<Connection> returned_;
