@@ -19,5 +19,6 @@ void register_inference_benchmarks(const std::shared_ptr<RenderedFlight>& flight
 void register_segmentation_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
 void register_sensors_benchmarks();
 void register_slam_benchmarks(const std::shared_ptr<RenderedFlight>& flight);
+void register_stereo_benchmarks();
 
 }  // namespace roslam::benchmarks

@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   rb::register_segmentation_benchmarks(flight);
   rb::register_sensors_benchmarks();
   rb::register_slam_benchmarks(flight);
+  rb::register_stereo_benchmarks();
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
   return 0;

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Opens the web page of a simulated flight in a headless browser: the map appears and grows, a restart is survived.
 
-Usage: view_page_test.py PROGRAM [--seconds N] [--pictures FOLDER]
+Usage: view_page_test.py PROGRAM [--seconds N] [--pictures FOLDER] [--dynamic MODE]
   --seconds    that the flight is watched for errors of the console
+  --dynamic    of the flights, default geometry, which needs no network
   --pictures   where view.png, view_above.png, view_phone.png and view_phone_figures.png are written
 Exit code: 0 all is well, 1 not, 77 there is no browser.
 """
@@ -31,9 +32,9 @@ def free_port():
         return s.getsockname()[1]
 
 
-def fly(program, folder, port):
+def fly(program, folder, port, dynamic):
     return subprocess.Popen(
-        [program, "run", "simulated:street", "--quiet", "--dynamic", "geometry", "--out", folder,
+        [program, "run", "simulated:street", "--quiet", "--dynamic", dynamic, "--out", folder,
          "--view", f"127.0.0.1:{port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
@@ -90,13 +91,14 @@ def main():
     parser.add_argument("program")
     parser.add_argument("--seconds", type=float, default=15.0)
     parser.add_argument("--pictures", type=pathlib.Path)
+    parser.add_argument("--dynamic", default="geometry")
     arguments = parser.parse_args()
     if browser.find() is None:
         print("skipped: there is no Chromium (apt-get install chromium)")
         return 77
     port = free_port()
     with tempfile.TemporaryDirectory() as scratch:
-        flight = fly(arguments.program, scratch + "/first", port)
+        flight = fly(arguments.program, scratch + "/first", port, arguments.dynamic)
         page = browser.Browser(1280, 800)
         phone = browser.Browser(390, 780, 1.5, True) if arguments.pictures else None
         try:
@@ -117,7 +119,7 @@ def main():
             land(flight)
             require(page.wait_for("document.querySelector('#state').textContent === 'run ended'", 20),
                     "the end of the run is shown")
-            flight = fly(arguments.program, scratch + "/second", port)
+            flight = fly(arguments.program, scratch + "/second", port, arguments.dynamic)
             require(page.wait_for(f"roslam.link === 'up' && roslam.event.run !== '{first}' && "
                                   "roslam.scene.count().path > 2", 120), "another run is taken up by itself")
             land(flight)

@@ -68,6 +68,29 @@ void add_products(const float* patch_row, const float* strip_row, float* sums, i
   }
 }
 
+// Adds the values of a row and their squares to those of its columns.
+ROSLAM_TARGET_CLONES("avx2")
+void add_columns(const float* row, float* sums, float* squares, int columns) {
+  for (int i = 0; i < columns; ++i) {
+    sums[i] += row[i];
+    squares[i] += row[i] * row[i];
+  }
+}
+
+// Divides products by the norms of the patches at their places. squares: of the patch that is searched for.
+ROSLAM_TARGET_CLONES("avx2")
+void normalise(const float* sums, const float* all_squares, float squares, float* values, int places) {
+  for (int i = 0; i < places; ++i) {
+    float sum = 0.0F, square = 0.0F;
+    for (int k = 0; k < kSide; ++k) {
+      sum += sums[i + k];
+      square += all_squares[i + k];
+    }
+    const float variance = square - sum * sum / kArea;
+    values[i] = variance > kFlat ? values[i] / std::sqrt(variance * squares) : 0.0F;
+  }
+}
+
 // The correlation of a patch with all places of a strip.
 class Correlation {
  public:
@@ -75,19 +98,14 @@ class Correlation {
   void compute(const Patch& patch, float squares, const Strip& strip) {
     const int places = strip.places();
     values_.assign(static_cast<std::size_t>(places), 0.0F);
-    for (int r = 0; r < kSide; ++r)
+    sums_.assign(static_cast<std::size_t>(strip.columns), 0.0F);
+    squares_.assign(static_cast<std::size_t>(strip.columns), 0.0F);
+    for (int r = 0; r < kSide; ++r) {
       add_products(patch.data() + static_cast<std::ptrdiff_t>(r) * kSide, strip.row(r), values_.data(),
                    places);
-    sum_columns(strip);
-    float sum = 0.0F, square = 0.0F;
-    for (int k = 0; k < kSide - 1; ++k) add_column(k, sum, square);
-    for (int i = 0; i < places; ++i) {
-      add_column(i + kSide - 1, sum, square);
-      const float variance = square - sum * sum / kArea;
-      auto& value = values_[static_cast<std::size_t>(i)];
-      value = variance > kFlat ? value / std::sqrt(variance * squares) : 0.0F;
-      add_column(i, sum, square, -1.0F);
+      add_columns(strip.row(r), sums_.data(), squares_.data(), strip.columns);
     }
+    normalise(sums_.data(), squares_.data(), squares, values_.data(), places);
   }
 
   int best() const {
@@ -105,22 +123,6 @@ class Correlation {
   }
 
  private:
-  void sum_columns(const Strip& strip) {
-    sums_.assign(static_cast<std::size_t>(strip.columns), 0.0F);
-    squares_.assign(static_cast<std::size_t>(strip.columns), 0.0F);
-    for (int r = 0; r < kSide; ++r) {
-      const float* row = strip.row(r);
-      for (std::size_t i = 0; i < sums_.size(); ++i) {
-        sums_[i] += row[i];
-        squares_[i] += row[i] * row[i];
-      }
-    }
-  }
-  void add_column(int column, float& sum, float& square, float sign = 1.0F) const {
-    sum += sign * sums_[static_cast<std::size_t>(column)];
-    square += sign * squares_[static_cast<std::size_t>(column)];
-  }
-
   std::vector<float> values_, sums_, squares_;
 };
 

@@ -64,7 +64,7 @@ class Runner {
   void process(const Frame& frame) {
     const FrameResult result = slam_.process(frame);
     if (!result.is_used()) return;
-    if (frame.depth.empty()) ++summary_.without_depth;
+    if (frame.depth.empty() && frame.right.empty()) ++summary_.without_depth;
     if (frame.T_world_camera && frame.T_world_camera->is_finite()) {
       summary_.truth.push_back({frame.timestamp, *frame.T_world_camera});
     }

@@ -16,7 +16,7 @@ namespace roslam {
 struct ROSLAM_EXPORT RunSummary {
   std::size_t dropped = 0;           ///< frames the tracker was too busy for (real-time mode)
   std::size_t longest_gap = 0;       ///< the most of these in a row
-  std::size_t without_depth = 0;     ///< frames that came without a depth image
+  std::size_t without_depth = 0;     ///< frames that came without a depth image or a right one
   bool interrupted = false;          ///< stopped before the source ended
   std::exception_ptr failure;        ///< what ended the run early, else null; the results until then are good
   double wall_seconds = 0.0;         ///< from the first read to the last result

@@ -106,6 +106,8 @@ void add_benchmark_options(CLI::App& command, BenchmarkArguments& arguments) {
   command.add_option("--frames", arguments.settings.frames, "Number of frames of simulated flights; 0 = all")
       ->capture_default_str();
   command.add_option("--seed", arguments.settings.seed, "Seed of simulated flights")->capture_default_str();
+  command.add_flag("--stereo", arguments.settings.stereo,
+                   "Simulated flights have stereo pairs in place of depth");
   command.add_flag("--overwrite", arguments.overwrite,
                    "Replace files in the folder of --out that no benchmark wrote");
   command.add_flag("--quiet", arguments.quiet, "Print no progress");

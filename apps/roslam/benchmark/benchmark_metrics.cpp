@@ -137,14 +137,17 @@ nlohmann::ordered_json json_of(const BenchmarkedSequence& sequence) {
 
 nlohmann::ordered_json head_json(const std::string& benchmark, const BenchmarkHeader& header) {
   const BenchmarkSettings& settings = header.settings;
-  Json json{
-      {"benchmark", benchmark},
-      {"version", header.version},
-      {"machine", {{"processor", header.processor}, {"cores", header.cores}}},
-      {"mode", name_of(settings.mode)},
-      {"runs", header.runs},
-      {"interrupted", header.is_interrupted},
-      {"simulation", {{"traffic", settings.traffic}, {"frames", settings.frames}, {"seed", settings.seed}}}};
+  Json json{{"benchmark", benchmark},
+            {"version", header.version},
+            {"machine", {{"processor", header.processor}, {"cores", header.cores}}},
+            {"mode", name_of(settings.mode)},
+            {"runs", header.runs},
+            {"interrupted", header.is_interrupted},
+            {"simulation",
+             {{"traffic", settings.traffic},
+              {"frames", settings.frames},
+              {"seed", settings.seed},
+              {"stereo", settings.stereo}}}};
   json["config"] = settings.config.empty() ? Json(nullptr) : Json(settings.config);
   return json;
 }

@@ -29,12 +29,13 @@ std::vector<std::string> run_arguments(const BenchmarkSequence& sequence, const 
   if (!settings.config.empty()) add("--config", settings.config);
   if (settings.degrade != "none") add("--degrade", settings.degrade);
   if (!sequence.is_simulated()) {
-    add("--camera", sequence.camera);
+    if (!sequence.camera.empty()) add("--camera", sequence.camera);
     return arguments;
   }
   add("--traffic", settings.traffic);
   add("--frames", std::to_string(settings.frames));
   add("--seed", std::to_string(settings.seed));
+  if (settings.stereo) arguments.emplace_back("--stereo");
   return arguments;
 }
 

@@ -23,6 +23,7 @@ struct BenchmarkSettings {
   std::string traffic = "none";  ///< of simulated flights
   std::size_t frames = 300;      ///< of simulated flights; 0 = all
   std::uint32_t seed = 1;        ///< of simulated flights
+  bool stereo = false;           ///< simulated flights have stereo pairs in place of depth
   std::string degrade = "none";  ///< of the images: a name of simulation::degradation_names()
 };
 

@@ -45,7 +45,7 @@ BenchmarkSequence recorded(const std::string& argument, const std::string& fallb
   }
   if (sequence.camera.empty() && fs::exists(folder / "camera.yaml"))
     sequence.camera = (folder / "camera.yaml").string();
-  if (sequence.camera.empty()) {
+  if (sequence.camera.empty() && !is_other_dataset(sequence.source)) {
     throw InputError(argument + ": needs a camera: FOLDER:CAMERA, --camera or a camera.yaml in the folder");
   }
   open_source({sequence.source, sequence.camera});

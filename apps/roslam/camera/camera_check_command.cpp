@@ -16,6 +16,7 @@
 #include "apps/roslam/support/progress.hpp"
 #include "apps/roslam/support/sources.hpp"
 #include "evaluation/camera_check/camera_check.hpp"
+#include "evaluation/camera_check/stereo_check.hpp"
 #include "evaluation/json_number.hpp"
 #include "roslam/datasets/dataset.hpp"
 #include "simulation/faulty_camera_source.hpp"
@@ -26,6 +27,7 @@ using evaluation::CameraCheck;
 using evaluation::CameraFinding;
 using evaluation::Contrast;
 using evaluation::number;
+using evaluation::StereoCheck;
 
 namespace {
 using Json = nlohmann::ordered_json;
@@ -37,7 +39,11 @@ struct Arguments {
   bool quiet = false;
 };
 
-std::vector<std::pair<std::string, const CameraFinding*>> findings(const CameraCheck& check) {
+using Findings = std::vector<std::pair<std::string, const CameraFinding*>>;
+
+Findings findings(const StereoCheck& check) { return {{"order", &check.order}, {"rows", &check.rows}}; }
+
+Findings findings(const CameraCheck& check) {
   return {{"depth scale", &check.depth_scale},
           {"registration", &check.registration},
           {"timing", &check.timing},
@@ -74,14 +80,30 @@ Json json_of(const evaluation::EdgeFit& fit) {
           {"tells_registration", number(fit.tells_registration)}};
 }
 
-Json report(const CameraCheck& check, const SourceArguments& source) {
-  Json json{{"source", source.name}, {"nothing_misfits", check.fits()}};
-  for (const auto& [name, finding] : findings(check)) {
+Json report_of(const Findings& findings, bool fits, const SourceArguments& source) {
+  Json json{{"source", source.name}, {"nothing_misfits", fits}};
+  for (const auto& [name, finding] : findings) {
     std::string key = name;
     std::replace(key.begin(), key.end(), ' ', '_');
     json[key] = {{"verdict", name_of(finding->verdict)}, {"finding", finding->words}};
     if (!finding->remedy.empty()) json[key]["remedy"] = finding->remedy;
   }
+  return json;
+}
+
+Json report(const StereoCheck& check, const SourceArguments& source) {
+  Json json = report_of(findings(check), check.fits(), source);
+  json["pairs"] = check.pairs;
+  json["matches"] = check.matches;
+  json["to_the_left"] = number(check.to_the_left);
+  json["to_the_right"] = number(check.to_the_right);
+  json["row_offset_pixels"] = number(check.offset);
+  json["row_offset_in_worst_corner_pixels"] = number(check.worst);
+  return json;
+}
+
+Json report(const CameraCheck& check, const SourceArguments& source) {
+  Json json = report_of(findings(check), check.fits(), source);
   json["notes"] = preset_notes(source.camera);
   json["frames_read"] = check.frames_read;
   json["runs"] = check.runs;
@@ -100,8 +122,8 @@ Json report(const CameraCheck& check, const SourceArguments& source) {
   return json;
 }
 
-void print(const CameraCheck& check, const SourceArguments& source) {
-  for (const auto& [name, finding] : findings(check)) {
+void print(const Findings& findings, const SourceArguments& source) {
+  for (const auto& [name, finding] : findings) {
     std::cout << name << ": " << name_of(finding->verdict) << "\n  " << finding->words << "\n";
     if (!finding->remedy.empty()) std::cout << "  remedy: " << finding->remedy << "\n";
   }
@@ -124,27 +146,30 @@ void run(const Arguments& arguments) {
     source = std::make_unique<simulation::FaultyCameraSource>(std::move(source), faults);
   }
   const InterruptWatcher interrupt;
-  CameraCheck check;
-  {
-    std::unique_ptr<Progress> progress;
-    check = evaluation::check_camera(
-        *source, arguments.source.name, {},
-        [&](std::size_t done, std::size_t total) {
-          if (!progress) progress = std::make_unique<Progress>(total, arguments.quiet);
-          progress->show(done, "read");
-        },
-        interrupt.token());
+  std::unique_ptr<Progress> progress;
+  const auto show = [&](std::size_t done, std::size_t total) {
+    if (!progress) progress = std::make_unique<Progress>(total, arguments.quiet);
+    progress->show(done, "read");
+  };
+  const auto tell = [&](const auto& check) {
+    progress.reset();
+    if (arguments.json)
+      std::cout << report(check, arguments.source).dump(-1, ' ', false, Json::error_handler_t::replace)
+                << "\n";
+    else
+      print(findings(check), arguments.source);
+    require_written_output();
+    std::string misfits;
+    for (const auto& [name, finding] : findings(check))
+      if (finding->verdict == evaluation::Verdict::kDoesNotFit)
+        misfits += (misfits.empty() ? "" : ", ") + name;
+    if (!misfits.empty()) throw FailedCheck(arguments.source.name + ": does not fit its camera: " + misfits);
+  };
+  if (source->camera().is_stereo()) {
+    tell(evaluation::check_stereo(*source, arguments.source.name, show, interrupt.token()));
+  } else {
+    tell(evaluation::check_camera(*source, arguments.source.name, {}, show, interrupt.token()));
   }
-  if (arguments.json)
-    std::cout << report(check, arguments.source).dump(-1, ' ', false, Json::error_handler_t::replace) << "\n";
-  else
-    print(check, arguments.source);
-  require_written_output();
-  if (check.fits()) return;
-  std::string misfits;
-  for (const auto& [name, finding] : findings(check))
-    if (finding->verdict == evaluation::Verdict::kDoesNotFit) misfits += (misfits.empty() ? "" : ", ") + name;
-  throw FailedCheck(arguments.source.name + ": does not fit its camera: " + misfits);
 }
 }  // namespace
 
@@ -153,7 +178,7 @@ void add_camera_check_command(CLI::App& camera) {
   CLI::App* command =
       camera.add_subcommand("check",
                             "Tell from a recording whether its camera file fits: lens, depth scale, "
-                            "registration and timing of depth");
+                            "registration and timing of depth; of stereo pairs order and rows");
   command->footer(
       "Examples:\n"
       "  roslam camera check my_flight --camera my_camera.yaml\n"

@@ -48,9 +48,12 @@ void require_poses(const Slam& slam, const RunResults& summary, const FrameSourc
     throw InputError(name + ": no frame could be tracked, none has depth" + reasons +
                      "; RGB-D tracking needs a depth image near in time to each colour image");
   }
-  throw InputError(name + ": no frame could be tracked" + reasons + "; tracking starts at an image with " +
-                   std::to_string(slam.options().tracker.min_initial_points) +
-                   " corners of known depth: check the images and depth_units_per_metre of the camera");
+  throw InputError(
+      name + ": no frame could be tracked" + reasons + "; tracking starts at an image with " +
+      std::to_string(slam.options().tracker.min_initial_points) + " corners of known depth: check " +
+      (slam.camera().is_stereo()
+           ? "with roslam camera check whether left and right are swapped or rows do not correspond"
+           : "the images and depth_units_per_metre of the camera"));
 }
 
 // What takes each frame and its result; null or empty: nothing.
