@@ -61,10 +61,10 @@ struct Strip {
 // Adds to sums, for each place, the product of a row of the patch with the row of the strip there.
 ROSLAM_TARGET_CLONES("avx2")
 void add_products(const float* patch_row, const float* strip_row, float* sums, int places) {
-  for (int k = 0; k < kSide; ++k) {
-    const float factor = patch_row[k];
-    const float* values = strip_row + k;
-    for (int i = 0; i < places; ++i) sums[i] += factor * values[i];
+  for (int i = 0; i < places; ++i) {
+    float sum = sums[i];
+    for (int k = 0; k < kSide; ++k) sum += patch_row[k] * strip_row[i + k];
+    sums[i] = sum;
   }
 }
 
