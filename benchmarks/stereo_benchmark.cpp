@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 #include "benchmarks/benchmarks.hpp"

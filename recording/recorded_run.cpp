@@ -28,6 +28,7 @@ Camera camera_from(const Json& json) {
   camera.set_lens(json.value("model", "pinhole"), json.at("distortion").get<std::vector<double>>());
   json.at("depth_units_per_metre").get_to(camera.depth_units_per_metre);
   json.at("fps").get_to(camera.fps);
+  camera.baseline = json.value("baseline", 0.0);
   if (json.contains("T_body_camera")) {
     const auto T = json["T_body_camera"].get<std::array<double, 16>>();
     const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(T.data());

@@ -49,6 +49,7 @@ Json camera_json(const Camera& camera, const RunDescription& description) {
           {"distortion", camera.coefficients()},
           {"depth_units_per_metre", camera.depth_units_per_metre},
           {"fps", camera.fps},
+          {"baseline", camera.baseline},
           {"T_body_camera", std::vector<double>(T_body_camera.data(), T_body_camera.data() + 16)},
           {"name", description.camera}};
 }

@@ -29,7 +29,9 @@ SequenceRestorer::SequenceRestorer(const RecordedRun& run, StaticSceneRestorer& 
     : run_(run),
       restorer_(restorer),
       options_(restorer.settings().restoration),
-      source_times_(times_of_sources(run, options_)) {}
+      source_times_(times_of_sources(run, options_)) {
+  if (run.camera().is_stereo()) stereo_.emplace(run.camera(), StereoOptions());
+}
 
 bool SequenceRestorer::is_source(double timestamp) const {
   return source_times_.contains(time_text(timestamp));
@@ -37,7 +39,8 @@ bool SequenceRestorer::is_source(double timestamp) const {
 
 // Nothing, with the reason, if the removed area of the frame is unknown.
 std::optional<PosedImage> SequenceRestorer::posed_image(const Frame& frame, std::string& reason) const {
-  PosedImage image{frame.timestamp, run_.pose_at(frame.timestamp), frame.colour, frame.depth, {}};
+  const cv::Mat depth = stereo_ ? stereo_->with_depth(frame).depth : frame.depth;
+  PosedImage image{frame.timestamp, run_.pose_at(frame.timestamp), frame.colour, depth, {}};
   const RecordedRemoval& removal = run_.removal();
   if (!removal.has_frames()) return image;
   const RecordedFrame* recorded = removal.find(frame.timestamp);

@@ -12,6 +12,7 @@
 #include "recording/recorded_run.hpp"
 #include "roslam/restoration/static_scene_restorer.hpp"
 #include "roslam/sensors/frame_source.hpp"
+#include "roslam/stereo/dense_stereo.hpp"
 
 namespace roslam::recording {
 
@@ -39,6 +40,7 @@ class SequenceRestorer {
   std::optional<PosedImage> posed_image(const Frame& frame, std::string& reason) const;
 
   const RecordedRun& run_;
+  std::optional<DenseStereo> stereo_;  // gives the depth of stereo pairs
   StaticSceneRestorer& restorer_;
   RestorationOptions options_;
   std::set<std::string> source_times_;  // as time_text

@@ -99,8 +99,11 @@ std::optional<Frame> DegradedSource::next() {
       inertial = std::move(frame->inertial);
       continue;
     }
-    if (degradation_ == Degradation::kBlur) frame->colour = blurred(frame->colour, frame->index);
-    if (degradation_ == Degradation::kExposure) frame->colour = exposed(frame->colour, frame->index);
+    for (cv::Mat* image : {&frame->colour, &frame->right}) {
+      if (image->empty()) continue;
+      if (degradation_ == Degradation::kBlur) *image = blurred(*image, frame->index);
+      if (degradation_ == Degradation::kExposure) *image = exposed(*image, frame->index);
+    }
     return frame;
   }
   return std::nullopt;

@@ -21,6 +21,7 @@ class WrappedSource : public FrameSource {
   void interrupt() override { source_.interrupt(); }
   bool is_live() const override { return source_.is_live(); }
   const Camera& camera() const override { return source_.camera(); }
+  std::optional<RightCamera> right() const override { return source_.right(); }
   std::optional<std::size_t> size() const override { return source_.size(); }
   std::map<std::string, std::size_t> skipped() const override { return source_.skipped(); }
   std::map<std::string, std::size_t> notes() const override { return source_.notes(); }

@@ -169,9 +169,9 @@ TEST_F(Atlas, SaysWhatIsWrongWithAFile) {
   expect_error("not a map");
   save_map(file_, fly(0.0, 0.25));
   std::string bytes = read(file_);
-  bytes[8] = 4;
+  bytes[8] = 5;
   write_file(file_, bytes);
-  expect_error("version 4");
+  expect_error("version 5");
 }
 
 TEST_F(Atlas, KeepsTheLensModel) {

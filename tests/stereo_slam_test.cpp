@@ -179,9 +179,12 @@ class ListedPairs : public FrameSource {
   }
   using FrameSource::next;
   const Camera& camera() const override { return camera_; }
+  std::optional<RightCamera> right() const override { return right_; }
+  void set_right(const RightCamera& right) { right_ = right; }
 
  private:
   Camera camera_;
+  std::optional<RightCamera> right_;
   std::vector<Frame> frames_;
   std::size_t at_ = 0;
 };
@@ -199,10 +202,14 @@ TEST(RectifiedSource, LeavesOutRightImagesThatAreOfNoUse) {
   std::vector<Frame> frames{made_up(0, 50, 60), made_up(1, 51, 0),  made_up(2, 52, 61), made_up(3, 53, 61),
                             made_up(4, 54, -1), made_up(5, 54, 62), made_up(6, 55, 63), made_up(7, 56, 64)};
   frames[7].right = cv::Mat(10, 10, CV_8UC1, cv::Scalar(64));
+  for (const std::size_t i : {5U, 6U}) frames[i].inertial.push_back(InertialSample{});
   RectifiedSource source(std::make_unique<ListedPairs>(frames));
   std::vector<std::size_t> with_right, without;
-  while (const auto frame = source.next())
+  while (const auto frame = source.next()) {
     (frame->right.empty() ? without : with_right).push_back(frame->index);
+    EXPECT_EQ(frame->inertial.size(), frame->index == 6 ? 2U : 0U)
+        << "those of a frame that is skipped are kept";
+  }
   EXPECT_EQ(with_right, (std::vector<std::size_t>{0, 2, 6}));
   EXPECT_EQ(without, (std::vector<std::size_t>{1, 3, 4, 7}));
   const Counts expected{{"right image is black", 1},
@@ -210,6 +217,15 @@ TEST(RectifiedSource, LeavesOutRightImagesThatAreOfNoUse) {
                         {"right image of another size than the left one", 1}};
   EXPECT_EQ(source.skipped_depth(), expected);
   EXPECT_EQ(source.skipped(), (Counts{{"left image is that of the frame before", 1}}));
+}
+
+TEST(RectifiedSource, RefusesACameraOfRectifiedPairsForOthers) {
+  auto pairs = std::make_unique<ListedPairs>(std::vector<Frame>{made_up(0, 50, 60)});
+  pairs->set_right({Camera(), SE3(Eigen::Quaterniond::Identity(), {0.1, 0.0, 0.0})});
+  EXPECT_EQ(RectifiedSource(std::move(pairs)).camera().baseline, 0.1);
+  pairs = std::make_unique<ListedPairs>(std::vector<Frame>{made_up(0, 50, 60)});
+  pairs->set_right({Camera(), SE3(so3_exp({0.0, 0.01, 0.0}), {0.1, 0.0, 0.0})});
+  EXPECT_THROW(RectifiedSource(std::move(pairs)), CalibrationError);
 }
 
 TEST(RectifiedSource, NeedsPairs) {

@@ -27,6 +27,7 @@
 #include "roslam/datasets/folder_source.hpp"
 #include "roslam/datasets/tum_source.hpp"
 #include "roslam/options/settings.hpp"
+#include "roslam/stereo/rectified_source.hpp"
 
 namespace roslam::app {
 
@@ -48,6 +49,8 @@ struct RestoreArguments {
 };
 
 std::string name_of_files(const FrameSource& source, const Frame& frame) {
+  if (const auto* pairs = dynamic_cast<const RectifiedSource*>(&source))
+    return name_of_files(pairs->source(), frame);
   if (const auto* folder = dynamic_cast<const TumSource*>(&source))
     return folder->colour_file(frame.index).stem().string();
   if (const auto* folder = dynamic_cast<const FolderSource*>(&source))
@@ -196,8 +199,9 @@ void restore(RestoreArguments arguments, const std::string& version) {
 
 // Options of the source are recorded in the run and must not contradict it.
 void require_no_flight_options(const CLI::App& command) {
-  for (const char* name : {"--camera", "--traffic", "--frames", "--seed", "--speed", "--altitude", "--aside",
-                           "--fps", "--gusts", "--gain", "--colour", "--depth", "--truth", "--imu"})
+  for (const char* name :
+       {"--camera", "--traffic", "--frames", "--seed", "--speed", "--altitude", "--aside", "--fps", "--gusts",
+        "--gain", "--colour", "--depth", "--truth", "--imu", "--stereo"})
     if (command.count(name) > 0) throw CLI::ValidationError(name, "is known from the run; leave it out");
 }
 }  // namespace

@@ -15,10 +15,10 @@
 namespace roslam::evaluation {
 
 namespace {
-constexpr std::size_t kPairs = 30, kEvery = 5;  // frames
-constexpr std::size_t kEnough = 300;            // matches
-constexpr double kMostOffset = 30.0;            // pixels
-constexpr double kAround = 3.0;                 // pixels, of the most frequent offset
+constexpr std::size_t kPairs = 30, kEvery = 5, kFrames = 1500;  // frames
+constexpr std::size_t kEnough = 300;                            // matches
+constexpr double kMostOffset = 30.0;                            // pixels
+constexpr double kAround = 3.0;                                 // pixels, of the most frequent offset
 
 struct Match {
   cv::Point2f left;
@@ -132,7 +132,7 @@ StereoCheck check_stereo(FrameSource& source, const std::string& name,
   StereoCheck check;
   const OrbExtractor extractor;
   std::vector<Match> matches;
-  for (std::size_t i = 0; check.pairs < kPairs; ++i) {
+  for (std::size_t i = 0; check.pairs < kPairs && i < kFrames; ++i) {
     const auto frame = source.next(stop);
     if (stop.stop_requested()) throw InputError(name + ": interrupted before the check was done");
     if (!frame) break;

@@ -14,8 +14,8 @@ namespace {
 constexpr int kRadius = 5;  // pixels of a level
 constexpr int kSide = 2 * kRadius + 1;
 constexpr int kArea = kSide * kSide;
-constexpr int kMargin =
-    2;  // pixels beyond the least disparity: neighbours of a far point, cubic interpolation
+// Pixels beyond the least disparity: neighbours of a far point, and cubic interpolation.
+constexpr int kMargin = 2;
 constexpr float kFlat = 4.0F * kArea;  // a variance of four grey levels: what sensor noise alone has
 
 using Patch = std::array<float, kArea>;

@@ -114,8 +114,8 @@ void Camera::validate() const {
   constexpr double kFar = 10.0;  // metres; more is a wrong unit
   require(T_body_camera.is_finite() && T_body_camera.translation().norm() <= kFar,
           "T_body_camera must be a rigid transform of at most 10 m");
-  require(baseline >= 0.0 && baseline <= kFar,
-          "baseline must be 0 (no stereo pair) to 10 metres, got " + std::to_string(baseline));
+  require(baseline == 0.0 || (baseline >= 1e-3 && baseline <= kFar),
+          "baseline must be 0 (no stereo pair) or 0.001 to 10 metres, got " + std::to_string(baseline));
   require(baseline == 0.0 || !has_distortion(),
           "a camera with a baseline is of rectified images; it has no "
           "distortion");

@@ -117,6 +117,13 @@ bool has_noise(const SavedMap& saved) {
   });
 }
 
+bool has_stereo(const SavedMap& saved) {
+  if (saved.camera.is_stereo()) return true;
+  const auto ids = saved.map.keyframe_ids();
+  return std::any_of(ids.begin(), ids.end(),
+                     [&](KeyframeId id) { return !saved.map.find(id)->view->inverse_depth_sigmas.empty(); });
+}
+
 void put_noise(BinaryWriter& writer, const SavedMap& saved) {
   put(writer, saved.camera.depth_noise);
   for (const KeyframeId id : saved.map.keyframe_ids()) {
@@ -128,7 +135,7 @@ void put_noise(BinaryWriter& writer, const SavedMap& saved) {
 
 std::uint32_t version_of(const SavedMap& saved) {
   const Camera& camera = saved.camera;
-  if (camera.is_stereo()) return kWithStereo;
+  if (has_stereo(saved)) return kWithStereo;
   if (camera.model != LensModel::kPinhole || camera.coefficients().size() > kFirstCoefficients)
     return kWithLens;
   return has_noise(saved) ? kWithNoise : kWithoutNoise;
@@ -279,11 +286,13 @@ class Decoder {
   }
 
   void get_stereo(Camera& camera, const std::vector<std::shared_ptr<ObservedFrame>>& views) {
+    constexpr float kLeast = 1e-9F;
     camera.baseline = get_finite<double>();
     for (const auto& view : views) {
       for (std::size_t i = 0; i < view->size(); ++i) {
-        view->inverse_depth_sigmas.push_back(get_finite<float>());
-        require(view->inverse_depth_sigmas.back() >= 0.0F, "it contains a negative deviation");
+        const auto sigma = get_finite<float>();
+        require(sigma == 0.0F || (sigma > kLeast && sigma < kMaxNoise), "it contains a noise out of range");
+        view->inverse_depth_sigmas.push_back(sigma);
       }
     }
   }

@@ -71,7 +71,7 @@ bool FrontEnd::fills_image(const Frame& frame, const FrontEndResult& observation
 }
 
 void FrontEnd::check_input(const Frame& frame, const cv::Mat& grey, FrontEndResult& observation) {
-  if (!stereo_) depth_check_.add(grey, frame.depth, frame.timestamp);
+  if (frame.right.empty() || !stereo_) depth_check_.add(grey, frame.depth, frame.timestamp);
   const auto all = warnings();
   for (const auto& [warning, frames] : all) {
     if (warned_.insert(warning).second) observation.warnings.push_back(warning);
@@ -118,9 +118,10 @@ void FrontEnd::extract(const Frame& frame, const cv::Mat& grey, const cv::Mat& m
   for (const auto& feature : features) {
     if (!feature.is_in_part) result.points.push_back(feature.pixel);
   }
+  const bool is_pair = stereo_ && !frame.right.empty();
   auto view = std::make_shared<ObservedFrame>(
-      roslam::observe(features, frame.colour, stereo_ ? cv::Mat() : frame.depth, camera_, options_.depth));
-  if (stereo_ && !frame.right.empty()) {
+      roslam::observe(features, frame.colour, is_pair ? cv::Mat() : frame.depth, camera_, options_.depth));
+  if (is_pair) {
     const auto right = extractor_.pyramid(brightness_.apply(frame.right));
     stereo_->set_depths(stereo_->match(features, pyramid, right), *view);
   }

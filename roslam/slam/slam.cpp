@@ -125,7 +125,12 @@ SurfaceChanges Slam::surface_changes(SubmapId submap, std::uint64_t revision, st
 
 std::optional<DenseMap> Slam::dense_map(const std::stop_token& stop) const {
   if (!impl_->dense) return std::nullopt;
-  return impl_->dense->result(main_submap(), stop);
+  auto map = impl_->dense->result(main_submap(), stop);
+  if (map && impl_->stereo_depth) {
+    map->dropped += impl_->stereo_depth->dropped();
+    map->faults = sum(map->faults, impl_->stereo_depth->faults());
+  }
+  return map;
 }
 
 std::shared_ptr<const DenseMap> Slam::dense_checkpoint() const {

@@ -61,7 +61,7 @@ Slam::Impl::Impl(const Camera& the_camera, const Options& the_options, Mode the_
   if (camera.is_stereo()) {
     dense_stereo.emplace(camera, options.stereo);
     stereo_depth.emplace(
-        *dense_stereo, mode, options.threads.keyframe_queue,
+        *dense_stereo, mode, options.dense.queue,
         [this](KeyframeId keyframe, DenseInput input) { hand_on(keyframe, std::move(input)); });
   }
   if (vocabulary == nullptr || !options.loop.enabled) return;

@@ -71,7 +71,7 @@ void Slam::Impl::submit(KeyframeId keyframe, const Frame& frame, const DynamicOb
   mapping.submit(keyframe);
   if (!dense && !restoration) return;
   DenseInput input = dense_input(keyframe, frame, objects);
-  if (stereo_depth && frame.depth.empty() && !frame.right.empty()) {
+  if (stereo_depth) {  // also those without a right image, to keep the order
     stereo_depth->submit(keyframe, std::move(input));
   } else {
     hand_on(keyframe, std::move(input));

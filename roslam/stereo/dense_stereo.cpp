@@ -49,6 +49,8 @@ cv::Mat DenseStereo::disparities(const cv::Mat& left, const cv::Mat& right) cons
   const double nearest = options_.dense_scale * camera_.fx * camera_.baseline / options_.min_depth;
   const double range = std::min({nearest, 0.5 * left.cols, kMostRange});
   const int count = std::max(1, cvCeil(range / kStep)) * kStep;
+  if (left.cols <= 2 * count || left.rows < kStep)
+    return cv::Mat::zeros(left.size(), CV_16SC1);  // none is known
   // Small and large changes of disparity cost that much, as OpenCV's documentation advises.
   constexpr int kSmall = 8 * kBlock * kBlock, kLarge = 32 * kBlock * kBlock;
   constexpr int kMostDifference = 1, kMostGradient = 31, kUniqueness = 8, kSpeckle = 60, kSpeckleRange = 1;
@@ -87,7 +89,8 @@ Frame DenseStereo::with_depth(Frame frame) const {
 DepthNoise dense_stereo_noise(const Camera& camera, const StereoOptions& options) {
   constexpr double kSigma = 0.3;      // pixels of the reduced image
   constexpr double kConstant = 1e-3;  // metres
-  return {kConstant, kSigma / (options.dense_scale * camera.fx * camera.baseline)};
+  constexpr double kMost = 1.0;       // 1/metre
+  return {kConstant, std::min(kMost, kSigma / (options.dense_scale * camera.fx * camera.baseline))};
 }
 
 }  // namespace roslam

@@ -31,6 +31,10 @@ RectifiedSource::RectifiedSource(std::unique_ptr<FrameSource> source)
     : source_(std::move(source)), camera_(source_->camera()) {
   if (const auto right = source_->right()) {
     rectifier_.emplace(camera_, *right);
+    if (camera_.is_stereo() && !rectifier_->is_identity())
+      throw CalibrationError(
+          "camera calibration: has a baseline, and so is of rectified images, but those of the "
+          "source are not; give the calibration of the left camera as it is, or none");
     camera_ = rectifier_->camera();
   } else if (!camera_.is_stereo()) {
     throw InputError("the source has no stereo pairs: it names no right camera");
@@ -47,12 +51,15 @@ std::optional<Frame> RectifiedSource::next() {
     if (!frame->right.empty()) last_right_ = frame->right;
     if (!is_left_new && is_right_new && fault.empty() && !frame->right.empty()) {
       ++skipped_["left image is that of the frame before"];
+      prepend_samples(std::move(inertial_), frame->inertial);
+      inertial_ = std::move(frame->inertial);
       continue;
     }
     if (!fault.empty()) {
       ++without_right_[fault];
       frame->right.release();
     }
+    prepend_samples(std::exchange(inertial_, {}), frame->inertial);
     rectify(*frame);
     return frame;
   }
@@ -68,7 +75,9 @@ std::string RectifiedSource::fault_of(const Frame& frame) {
 }
 
 void RectifiedSource::rectify(Frame& frame) const {
-  if (!rectifier_ || rectifier_->is_identity()) return;
+  const bool has_size =
+      frame.colour.size() == cv::Size(camera_.width, camera_.height);  // others are rejected later
+  if (!rectifier_ || rectifier_->is_identity() || !has_size) return;
   frame.colour = rectifier_->left(frame.colour);
   if (!frame.right.empty()) frame.right = rectifier_->right(frame.right);
   frame.depth.release();  // of other pixels

@@ -41,7 +41,8 @@ class ROSLAM_EXPORT RectifiedSource : public FrameSource {
   std::unique_ptr<FrameSource> source_;
   std::optional<StereoRectifier> rectifier_;  // none: the source's pairs are rectified
   Camera camera_;
-  cv::Mat last_left_, last_right_;  // as the source gave them
+  cv::Mat last_left_, last_right_;        // as the source gave them
+  std::vector<InertialSample> inertial_;  // of frames that were skipped
   Counts skipped_, without_right_;
 };
 

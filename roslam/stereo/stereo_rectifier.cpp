@@ -103,6 +103,8 @@ void set_pinhole(Camera& camera, const View& view) {
   camera.fx = camera.fy = f;
   camera.cx = 0.5 * (camera.width - 1) - 0.5 * f * (view.left + view.right);
   camera.cy = 0.5 * (camera.height - 1) - 0.5 * f * (view.top + view.bottom);
+  if (camera.cx <= 0.0 || camera.cx >= camera.width || camera.cy <= 0.0 || camera.cy >= camera.height)
+    fail("the views of the two cameras overlap only beside the direction across the baseline");
 }
 }  // namespace
 

@@ -28,8 +28,9 @@ void StereoDepthWorker::work(KeyframeId keyframe, StageTimes& times) {
   if (!input) return;  // dropped
   try {
     const Stopwatch watch;
+    const bool has_depth = !input->frame.depth.empty();
     input->frame = stereo_.with_depth(std::move(input->frame));
-    times.add("stereo.dense", watch.seconds());
+    if (!has_depth) times.add("stereo.dense", watch.seconds());
   } catch (const std::exception& error) {
     jobs_.note_fault(error);
   }

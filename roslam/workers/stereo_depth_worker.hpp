@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "roslam/common/stage_times.hpp"
+#include "roslam/sensors/counts.hpp"
 #include "roslam/stereo/dense_stereo.hpp"
 #include "roslam/workers/dense_worker.hpp"
 #include "roslam/workers/keyframe_jobs.hpp"
@@ -12,8 +13,8 @@
 namespace roslam {
 
 /// Computes the depth images of keyframes that are stereo pairs, on a thread of its own at lower priority,
-/// and hands the keyframes on. In deterministic mode each is handed on at once. One whose depth fails is
-/// handed on without, and counted; of too many that wait the oldest are left out.
+/// and hands the keyframes on in their order. In deterministic mode each is handed on at once. One whose
+/// depth fails is handed on without, and counted; of too many that wait the oldest are left out and counted.
 class StereoDepthWorker {
  public:
   using OnDepth = std::function<void(KeyframeId, DenseInput)>;
@@ -28,6 +29,11 @@ class StereoDepthWorker {
 
   /// Discards the keyframes that wait.
   void cancel() { worker_.cancel(); }
+
+  std::size_t dropped() const { return jobs_.dropped(); }
+
+  /// What went wrong so far, in words, and how often.
+  Counts faults() const { return sum(jobs_.faults(), worker_.faults()); }
 
   StageTimes times() const { return worker_.times(); }
 

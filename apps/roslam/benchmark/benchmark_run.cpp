@@ -66,8 +66,8 @@ void read_report(const fs::path& file, BenchmarkRun& run) {
 void compare_with_truth(const BenchmarkSequence& sequence, const fs::path& folder, BenchmarkRun& run) {
   run.truth = sequence.truth;
   try {
-    // The run of a simulated flight writes its ground truth.
-    if (run.truth.empty() && sequence.is_simulated())
+    // The run writes the truth that its source has.
+    if (run.truth.empty() && fs::exists(folder / "groundtruth.txt"))
       run.truth = read_trajectory(folder / "groundtruth.txt").trajectory;
     if (run.tracked == 0.0) {
       run.no_error_reason = "no frame was tracked";

@@ -145,6 +145,9 @@ void run(const Arguments& arguments) {
     for (const std::string& name : arguments.faults) faults.push_back(*simulation::camera_fault_from(name));
     source = std::make_unique<simulation::FaultyCameraSource>(std::move(source), faults);
   }
+  if (!arguments.faults.empty() && source->camera().is_stereo())
+    throw InputError(
+        "--fault: is of the depth and the lens of cameras with depth, not of stereo pairs; leave it out");
   const InterruptWatcher interrupt;
   std::unique_ptr<Progress> progress;
   const auto show = [&](std::size_t done, std::size_t total) {

@@ -45,8 +45,11 @@ void require_poses(const Slam& slam, const RunResults& summary, const FrameSourc
   }
   const std::string reasons = skipped + in_words(source.skipped_depth());
   if (summary.without_depth == slam.frames()) {
-    throw InputError(name + ": no frame could be tracked, none has depth" + reasons +
-                     "; RGB-D tracking needs a depth image near in time to each colour image");
+    throw InputError(name + ": no frame could be tracked, none has " +
+                     (slam.camera().is_stereo() ? "a right image" : "depth") + reasons +
+                     (slam.camera().is_stereo()
+                          ? "; stereo needs a right image near in time to each left one"
+                          : "; RGB-D tracking needs a depth image near in time to each colour image"));
   }
   throw InputError(
       name + ": no frame could be tracked" + reasons + "; tracking starts at an image with " +

@@ -44,6 +44,12 @@ const std::string& kept(const std::string& file, const FrameSource& source) {
   return file;
 }
 
+const std::string& require_depth(const FrameSource& source, const std::string& file) {
+  if (source.camera().is_stereo())
+    throw InputError(file + ": stereo pairs cannot be recorded yet; record a source of colour and depth");
+  return file;
+}
+
 CameraRecorderOptions options_of(const FrameSource& source) {
   CameraRecorderOptions options;
   options.waits_for_disk = !source.is_live();
@@ -67,7 +73,7 @@ std::unique_ptr<LiveSource> open_live_camera(const std::string& name, const std:
 }
 
 SourceRecorder::SourceRecorder(FrameSource& source, const std::string& file)
-    : file_(file),
+    : file_(require_depth(source, file)),
       live_(dynamic_cast<LiveSource*>(&source)),
       recorder_(kept(file, source), calibration_of(source), options_of(source)) {
   if (live_ != nullptr) live_->on_sample([this](const CameraSample& sample) { recorder_.add(sample); });

@@ -38,6 +38,14 @@ fs::path prepared(const fs::path& folder) {
   return folder;
 }
 
+// Of images with depth, whatever gave it.
+Camera depth_camera(Camera camera) {
+  constexpr double kMillimetres = 1000.0;
+  camera.baseline = 0.0;
+  if (!(camera.depth_units_per_metre > 0.0)) camera.depth_units_per_metre = kMillimetres;
+  return camera;
+}
+
 bool lies_in(const fs::path& inner, const fs::path& outer) {
   const auto [end, at] = std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end());
   return end == outer.end();
@@ -46,10 +54,10 @@ bool lies_in(const fs::path& inner, const fs::path& outer) {
 
 RestoredFolder::RestoredFolder(fs::path folder, const Camera& camera)
     : folder_(prepared(folder)),
-      camera_(camera),
+      camera_(depth_camera(camera)),
       colours_(folder_ / "rgb.txt"),
       depths_(folder_ / "depth.txt") {
-  write_file(folder_ / "camera.yaml", camera_to_yaml(camera));
+  write_file(folder_ / "camera.yaml", camera_to_yaml(camera_));
   colours_.line("# timestamp filename");
   depths_.line("# timestamp filename");
 }

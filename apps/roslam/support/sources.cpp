@@ -52,7 +52,8 @@ CLI::Option* add_source_options(CLI::App& command, SourceArguments& arguments) {
   CLI::Option* source = command.add_option(
       "SOURCE", arguments.name,
       "Folder of a dataset (TUM RGB-D, 7-Scenes, ScanNet, ICL-NUIM, "
-      "OpenLORIS), recording (ROS 1 bag, rosbag2 file or folder, MCAP), camera (realsense, "
+      "OpenLORIS; stereo pairs of EuRoC, KITTI odometry), recording (ROS 1 bag, rosbag2 file or folder, "
+      "MCAP), camera (realsense, "
       "realsense:SERIAL), or "
       "simulated:street, simulated:loop, simulated:hover, simulated:turn, simulated:corridor");
   command.add_option(
@@ -257,7 +258,7 @@ std::unique_ptr<FrameSource> open_other_dataset(const SourceArguments& arguments
   if (!arguments.camera.empty()) camera = load_camera(arguments.camera);
   if (!arguments.mount.empty()) {
     // The mount is of the camera that the folder knows, if none is given.
-    if (!camera) camera = open_dataset(arguments.name, std::nullopt)->camera();
+    if (!camera) camera = open_dataset(arguments.name, std::nullopt, DatasetUse::kImages)->camera();
     camera->T_body_camera = mount_from(arguments.mount);
   }
   return open_dataset(arguments.name, camera);
