@@ -117,8 +117,7 @@ void Camera::validate() const {
   require(baseline == 0.0 || (baseline >= 1e-3 && baseline <= kFar),
           "baseline must be 0 (no stereo pair) or 0.001 to 10 metres, got " + std::to_string(baseline));
   require(baseline == 0.0 || !has_distortion(),
-          "a camera with a baseline is of rectified images; it has no "
-          "distortion");
+          "a camera with a baseline is of rectified images; it has no distortion");
   if (depth_noise) {
     const auto [constant, growth] = *depth_noise;
     require(constant >= 0.0 && constant < 10.0 && growth >= 0.0 && growth < 10.0 && constant + growth > 0.0,

@@ -108,20 +108,21 @@ void put(BinaryWriter& writer, const std::optional<DepthNoise>& noise) {
   writer.put(noise ? noise->growth : 0.0);
 }
 
-bool has_noise(const SavedMap& saved) {
-  if (saved.camera.depth_noise) return true;
+template <typename Has>
+bool any_view(const SavedMap& saved, const Has& has) {
   const auto ids = saved.map.keyframe_ids();
-  return std::any_of(ids.begin(), ids.end(), [&](KeyframeId id) {
-    const ObservedFrame& view = *saved.map.find(id)->view;
-    return view.pixel_sigma.has_value() || view.depth_noise.has_value();
-  });
+  return std::any_of(ids.begin(), ids.end(), [&](KeyframeId id) { return has(*saved.map.find(id)->view); });
+}
+
+bool has_noise(const SavedMap& saved) {
+  return saved.camera.depth_noise || any_view(saved, [](const ObservedFrame& view) {
+           return view.pixel_sigma.has_value() || view.depth_noise.has_value();
+         });
 }
 
 bool has_stereo(const SavedMap& saved) {
-  if (saved.camera.is_stereo()) return true;
-  const auto ids = saved.map.keyframe_ids();
-  return std::any_of(ids.begin(), ids.end(),
-                     [&](KeyframeId id) { return !saved.map.find(id)->view->inverse_depth_sigmas.empty(); });
+  return saved.camera.is_stereo() ||
+         any_view(saved, [](const ObservedFrame& view) { return !view.inverse_depth_sigmas.empty(); });
 }
 
 void put_noise(BinaryWriter& writer, const SavedMap& saved) {

@@ -44,19 +44,18 @@ void require_poses(const Slam& slam, const RunResults& summary, const FrameSourc
                      (localises ? "--localise-only" : "--map"));
   }
   const std::string reasons = skipped + in_words(source.skipped_depth());
+  const bool is_stereo = slam.camera().is_stereo();
   if (summary.without_depth == slam.frames()) {
     throw InputError(name + ": no frame could be tracked, none has " +
-                     (slam.camera().is_stereo() ? "a right image" : "depth") + reasons +
-                     (slam.camera().is_stereo()
-                          ? "; stereo needs a right image near in time to each left one"
-                          : "; RGB-D tracking needs a depth image near in time to each colour image"));
+                     (is_stereo ? "a right image" : "depth") + reasons +
+                     (is_stereo ? "; stereo needs a right image near in time to each left one"
+                                : "; RGB-D tracking needs a depth image near in time to each colour image"));
   }
   throw InputError(
       name + ": no frame could be tracked" + reasons + "; tracking starts at an image with " +
       std::to_string(slam.options().tracker.min_initial_points) + " corners of known depth: check " +
-      (slam.camera().is_stereo()
-           ? "with roslam camera check whether left and right are swapped or rows do not correspond"
-           : "the images and depth_units_per_metre of the camera"));
+      (is_stereo ? "with roslam camera check whether left and right are swapped or rows do not correspond"
+                 : "the images and depth_units_per_metre of the camera"));
 }
 
 // What takes each frame and its result; null or empty: nothing.
